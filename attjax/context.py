@@ -1,0 +1,21 @@
+"""What a controller knows of the spacecraft it steers, beside the observation."""
+
+import chex
+from flax import struct
+
+
+@struct.dataclass
+class Context:
+    """Constants of a closed loop, given to every policy and controller.
+
+    Attributes:
+        control_period: time between two actions, s.
+        inertia: (3,) principal moments or (3, 3) tensor, body frame, kg m².
+        torque_table: (actions, 3) torque of each action, body frame, N m.
+        rate_limit: largest admissible ‖ω‖, rad/s.
+    """
+
+    control_period: chex.Array
+    inertia: chex.Array
+    torque_table: chex.Array
+    rate_limit: chex.Array

@@ -1,0 +1,73 @@
+"""PPO's advantage estimate and losses, as plain functions of arrays."""
+
+import chex
+import jax
+import jax.numpy as jnp
+
+
+def generalized_advantages(
+    rewards, values, next_values, terminated, done, discount, gae_lambda
+) -> chex.Array:
+    """Generalised advantage estimates, right at terminations and at truncations.
+
+    δ_t = r_t + γ (1 − terminated_t) V(s'_t) − V(s_t),
+    Â_t = δ_t + γ λ (1 − done_t) Â_{t+1}.
+
+    With λ = 1 this is Eq. 5: the return, bootstrapped where an episode was cut, minus V(s_t).
+
+    Args:
+        rewards, values, next_values: (T, ...) r_t, V(s_t) and V(s'_t), where s'_t is the
+            state that step t led to, before any reset.
+        terminated: (T, ...) bool, s'_t has no future.
+        done: (T, ...) bool, the episode ended at step t, terminated or truncated.
+        discount: γ, scalar or broadcastable to the trailing axes.
+        gae_lambda: λ.
+
+    Returns:
+        (T, ...) advantages. Adding ``values`` gives the value function's targets.
+
+    Reference:
+        Schulman et al., High-dimensional continuous control using generalized advantage
+        estimation, 2016.
+    """
+    chex.assert_equal_shape([rewards, values, next_values, terminated, done])
+    deltas = rewards + discount * jnp.where(terminated, 0.0, next_values) - values
+    decay = discount * gae_lambda * jnp.where(done, 0.0, 1.0).astype(rewards.dtype)
+
+    def backward(advantage, step):
+        delta, decay = step
+        advantage = delta + decay * advantage
+        return advantage, advantage
+
+    _, advantages = jax.lax.scan(
+        backward, jnp.zeros_like(deltas[0]), (deltas, decay), reverse=True
+    )
+    return advantages
+
+
+def clipped_policy_loss(log_probability, old_log_probability, advantage, clip):
+    """Eq. 4 with the sign of a loss, averaged over (batch,) arrays.
+
+    Returns:
+        The loss and {"approximate_kl", "clip_fraction"}.
+    """
+    log_ratio = log_probability - old_log_probability
+    ratio = jnp.exp(log_ratio)
+    objective = jnp.minimum(
+        ratio * advantage, jnp.clip(ratio, 1 - clip, 1 + clip) * advantage
+    )
+    diagnostics = {
+        "approximate_kl": jnp.mean(ratio - 1 - log_ratio),
+        "clip_fraction": jnp.mean((jnp.abs(ratio - 1) > clip).astype(ratio.dtype)),
+    }
+    return -jnp.mean(objective), diagnostics
+
+
+def entropy(log_probabilities: chex.Array) -> chex.Array:
+    """Entropy (nats) of categorical distributions over the last axis."""
+    return -jnp.sum(jnp.exp(log_probabilities) * log_probabilities, axis=-1)
+
+
+def standardize(x: chex.Array) -> chex.Array:
+    """Shift and scale to mean 0 and standard deviation 1."""
+    return (x - jnp.mean(x)) / (jnp.std(x) + 1e-8)

@@ -1,0 +1,144 @@
+"""Policy and value networks, and what they see."""
+
+import dataclasses
+
+import chex
+import flax.linen as nn
+import jax.numpy as jnp
+from flax import struct
+
+from attjax import dynamics
+from attjax import observation as observations
+from attjax.context import Context
+
+SCALES = tuple(8.0**n for n in range(6))
+"""Factors of the multi-scale inputs: 1 resolves the slew, 32,768 the last 1e-5 of it."""
+
+MASKED_LOGIT = -1e9
+
+
+@struct.dataclass
+class Inputs:
+    """All that the networks see of one step.
+
+    Attributes:
+        features: (features,) network input.
+        allowed: (actions,) bool, the actions that are not masked.
+    """
+
+    features: chex.Array
+    allowed: chex.Array
+
+
+class MLP(nn.Module):
+    """Multilayer perceptron with ReLU (Table 3), in full float32 on every device."""
+
+    hidden_sizes: tuple[int, ...]
+    outputs: int
+    output_scale: float
+
+    @nn.compact
+    def __call__(self, x):
+        for size in self.hidden_sizes:
+            x = nn.relu(self._dense(size, 2**0.5)(x))
+        return self._dense(self.outputs, self.output_scale)(x)
+
+    def _dense(self, size, scale):
+        return nn.Dense(
+            size,
+            kernel_init=nn.initializers.orthogonal(scale),
+            param_dtype=jnp.zeros(()).dtype,
+            precision="highest",
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Policy:
+    """A categorical policy and its value function, two networks that share no parameters.
+
+    Attributes:
+        features: "state", the observation as it is, or "multiscale".
+        hidden_sizes: neurons of each hidden layer.
+        num_actions: number of actions.
+        rate_margin: actions that lead above this fraction of the rate limit are masked,
+            unless they slow the spacecraft down; 0: no mask.
+    """
+
+    features: str = "state"
+    hidden_sizes: tuple[int, ...] = (400, 300)
+    num_actions: int = 19
+    rate_margin: float = 0.0
+
+    @property
+    def policy_network(self) -> MLP:
+        return MLP(self.hidden_sizes, self.num_actions, 0.01)
+
+    @property
+    def value_network(self) -> MLP:
+        return MLP(self.hidden_sizes, 1, 1.0)
+
+    def init(self, policy_key, value_key, observation, context) -> dict:
+        """Random parameters {"policy": ..., "value": ...} for such an observation (size,)."""
+        features = self.encode(observation, context).features
+        return {
+            "policy": self.policy_network.init(policy_key, features),
+            "value": self.value_network.init(value_key, features),
+        }
+
+    def encode(self, observation: chex.Array, context: Context | None) -> Inputs:
+        """Features and mask of one observation (size,); no parameters are involved."""
+        features = observation
+        if self.features == "multiscale":
+            features = multiscale_features(observation, context.control_period)
+        allowed = jnp.ones(self.num_actions, bool)
+        if self.rate_margin > 0:
+            allowed = rate_mask(observation, context, self.rate_margin)
+        return Inputs(features, allowed)
+
+    def log_probabilities(self, params: dict, inputs: Inputs) -> chex.Array:
+        """LogSoftmax over the actions (Table 3), for inputs with any leading axes."""
+        logits = self.policy_network.apply(params["policy"], inputs.features)
+        return nn.log_softmax(jnp.where(inputs.allowed, logits, MASKED_LOGIT))
+
+    def value(self, params: dict, features: chex.Array) -> chex.Array:
+        """V(s), for features with any leading axes."""
+        return self.value_network.apply(params["value"], features)[..., 0]
+
+    def act(self, params: dict, observation: chex.Array, context: Context) -> chex.Array:
+        """The most probable action for one observation, int32."""
+        return jnp.argmax(self.log_probabilities(params, self.encode(observation, context)))
+
+
+def multiscale_features(observation: chex.Array, control_period: chex.Array) -> chex.Array:
+    """tanh(k x) of the quaternion's vector part and of ω for every k of SCALES.
+
+    Near the goal the state is 1e-5 of what it is at the start; each scale resolves its own
+    decades. q_s, the control period (in 0.1 s) and its logarithm are appended.
+
+    Args:
+        observation: (11,) Eq. 11.
+        control_period: scalar, s.
+
+    Returns:
+        (39,) features.
+    """
+    quaternion = observation[observations.QUATERNION]
+    state = jnp.concatenate([quaternion[:3], observation[observations.ANGULAR_VELOCITY]])
+    scaled = jnp.tanh(jnp.array(SCALES, state.dtype)[:, None] * state)
+    period = [quaternion[3], 10 * control_period, jnp.log(10 * control_period)]
+    return jnp.concatenate([scaled.ravel(), jnp.stack(period)])
+
+
+def rate_mask(observation: chex.Array, context: Context, margin: float) -> chex.Array:
+    """Which actions keep ‖ω‖ within ``margin`` times the rate limit, or do not raise it.
+
+    An action without torque is always allowed.
+
+    Returns:
+        (actions,) bool.
+    """
+    angular_velocity = observation[observations.ANGULAR_VELOCITY]
+    after = dynamics.rate_after_impulse(angular_velocity, context.torque_table, context.inertia)
+    limit = jnp.maximum((margin * context.rate_limit) ** 2, jnp.sum(angular_velocity**2))
+    coasts = jnp.all(context.torque_table == 0, axis=-1)
+    return coasts | (jnp.sum(after**2, axis=-1) <= limit)

@@ -1,0 +1,28 @@
+"""The paper's state vector (Eq. 11)."""
+
+import chex
+import jax.numpy as jnp
+
+from attjax import quaternion as quaternions
+
+SIZE = 11
+QUATERNION = slice(0, 4)
+ANGULAR_VELOCITY = slice(8, 11)
+
+
+def observe(quaternion: chex.Array, angular_velocity: chex.Array) -> chex.Array:
+    """Eq. 11: error quaternion, its rate and the angular velocity.
+
+    Args:
+        quaternion: (4,) error quaternion, scalar last.
+        angular_velocity: (3,) body frame, rad/s.
+
+    Returns:
+        (11,) vector [q (4), q̇ (4, 1/s), ω (3, rad/s)].
+
+    Example:
+        >>> observe(jnp.array([0.0, 0.0, 0.0, 1.0]), jnp.array([0.5, 0.0, 0.0]))[4].item()
+        0.25
+    """
+    rate = jnp.stack(quaternions.derivative(quaternion, angular_velocity))
+    return jnp.concatenate([quaternion, rate, angular_velocity])

@@ -1,0 +1,70 @@
+"""Unit quaternions, scalar last: ``[q1, q2, q3, q_s]`` (Eq. 8).
+
+The error quaternion relates the body frame to the desired frame; the goal is ``[0, 0, 0, 1]``.
+"""
+
+import chex
+import jax.numpy as jnp
+
+
+def from_axis_angle(axis: chex.Array, angle: chex.Array) -> chex.Array:
+    """Quaternion of a rotation (Eq. 8).
+
+    Args:
+        axis: (3,) unit vector of the rotation axis.
+        angle: scalar rotation angle, rad.
+
+    Returns:
+        (4,) unit quaternion, scalar last.
+
+    Example:
+        >>> from_axis_angle(jnp.array([0.0, 0.0, 1.0]), jnp.pi)[2].item()
+        1.0
+    """
+    axis = jnp.asarray(axis)
+    chex.assert_shape(axis, (3,))
+    return jnp.append(axis * jnp.sin(angle / 2), jnp.cos(angle / 2))
+
+
+def normalize(quaternion: chex.Array) -> chex.Array:
+    """Scale a (4,) quaternion to unit length."""
+    return quaternion / jnp.sqrt(jnp.sum(quaternion**2))
+
+
+def derivative(quaternion, angular_velocity):
+    """Kinematics, q̇ = ½ Ω(ω) q (Eq. 9 and 10), by components.
+
+    Args:
+        quaternion: four components, scalar last, as an array or a tuple.
+        angular_velocity: three body-frame components, rad/s, as an array or a tuple.
+
+    Returns:
+        Tuple of the four components of q̇, 1/s.
+
+    Example:
+        >>> [float(rate) for rate in derivative((0.0, 0.0, 0.0, 1.0), (0.2, 0.0, 0.0))]
+        [0.1, 0.0, 0.0, -0.0]
+    """
+    q1, q2, q3, qs = quaternion
+    w1, w2, w3 = angular_velocity
+    return (
+        0.5 * (w3 * q2 - w2 * q3 + w1 * qs),
+        0.5 * (w1 * q3 - w3 * q1 + w2 * qs),
+        0.5 * (w2 * q1 - w1 * q2 + w3 * qs),
+        -0.5 * (w1 * q1 + w2 * q2 + w3 * q3),
+    )
+
+
+def error_angle(quaternion: chex.Array) -> chex.Array:
+    """Rotation angle φ ∈ [0, 2π], rad, of a (4,) quaternion of any length.
+
+    φ = 2 atan2(‖q_v‖, q_s). The arc cosine of q_s would be blind below 0.04° in float32,
+    and there is no shortest-path flip: φ > π where q_s < 0, as Eq. 12 rewards q_s itself.
+
+    Example:
+        >>> round(jnp.rad2deg(error_angle(jnp.array([0.0, 1e-9, 0.0, 1.0]))).item(), 10)
+        1.146e-07
+    """
+    quaternion = jnp.asarray(quaternion)
+    chex.assert_shape(quaternion, (4,))
+    return 2 * jnp.arctan2(jnp.sqrt(jnp.sum(quaternion[:3] ** 2)), quaternion[3])

@@ -1,0 +1,99 @@
+"""Rewards: functions ``reward(transition) -> scalar`` of one agent step.
+
+To bring your own, pass any function of this signature to ``AttitudeEnv(reward=...)``.
+"""
+
+from typing import NamedTuple
+
+import chex
+import jax.numpy as jnp
+
+from attjax import quaternion as quaternions
+
+TERMINAL_BONUS = 50.0
+OVERSPEED_PENALTY = -50.0
+REFERENCE_PERIOD = 0.025
+"""Control period to which :func:`logarithmic_reward` is normalised, s (40 Hz)."""
+
+
+class Transition(NamedTuple):
+    """One agent step as a reward sees it.
+
+    Attributes:
+        quaternion: (4,) error quaternion before the step, scalar last.
+        next_quaternion: (4,) error quaternion after the step.
+        next_angular_velocity: (3,) angular velocity after the step, rad/s.
+        terminated: the rate limit was exceeded.
+        truncated: the time limit was reached, and the rate limit was not exceeded.
+        goal_angle: largest φ that counts as pointing, rad.
+        control_period: length of the agent step, s.
+    """
+
+    quaternion: chex.Array
+    next_quaternion: chex.Array
+    next_angular_velocity: chex.Array
+    terminated: chex.Array
+    truncated: chex.Array
+    goal_angle: chex.Array
+    control_period: chex.Array
+
+
+def scalar_part_increased(before: chex.Array, after: chex.Array) -> chex.Array:
+    """Whether q_s rose from one (4,) quaternion to the next (condition of Eq. 12).
+
+    Within 0.04° of the goal float32 q_s no longer changes, so where both q_s > 0.5 (or
+    both < −0.5) the sharper sin²(φ/2) = ‖q_v‖²/‖q‖² is compared instead.
+    """
+    sine_before, sine_after = (
+        jnp.sum(q[:3] ** 2) / jnp.sum(q**2) for q in (before, after)
+    )
+    near_goal = (before[3] > 0.5) & (after[3] > 0.5)
+    near_antipode = (before[3] < -0.5) & (after[3] < -0.5)
+    return jnp.where(
+        near_goal,
+        sine_after < sine_before,
+        jnp.where(near_antipode, sine_after > sine_before, after[3] > before[3]),
+    )
+
+
+def paper_reward(transition: Transition) -> chex.Array:
+    """Eq. 12 and 13; the last step's reward is replaced by the terminal reward.
+
+    The terminal reward is −50 beyond the rate limit; at the time limit it is +50 within the
+    goal angle, else 0.
+
+    Example:
+        >>> goal = jnp.array([0.0, 0.0, 0.0, 1.0])
+        >>> at_rest = Transition(goal, goal, jnp.zeros(3), False, False, 0.00436, 0.0875)
+        >>> paper_reward(at_rest).item()
+        9.0
+    """
+    angle = quaternions.error_angle(transition.next_quaternion)
+    inside = angle <= transition.goal_angle
+    improved = scalar_part_increased(transition.quaternion, transition.next_quaternion)
+    shaped = jnp.exp(-angle / (0.14 * 2 * jnp.pi)) - jnp.where(improved, 0.0, 1.0)
+    reward = shaped + jnp.where(inside, 9.0, 0.0)
+    reward = jnp.where(
+        transition.truncated, jnp.where(inside, TERMINAL_BONUS, 0.0), reward
+    )
+    return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
+
+
+def logarithmic_reward(transition: Transition) -> chex.Array:
+    """−log10(φ + 1e-6), φ in rad, for each 25 ms: every decade of pointing is worth the same.
+
+    The time limit earns the ordinary reward, to be bootstrapped by the learner; exceeding
+    the rate limit earns −50.
+
+    Example:
+        >>> goal = jnp.array([0.0, 0.0, 0.0, 1.0])
+        >>> at_rest = Transition(goal, goal, jnp.zeros(3), False, False, 0.00436, 0.05)
+        >>> round(logarithmic_reward(at_rest).item(), 4)
+        12.0
+    """
+    angle = quaternions.error_angle(transition.next_quaternion)
+    reward = -jnp.log10(angle + 1e-6) * transition.control_period / REFERENCE_PERIOD
+    return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
+
+
+REWARDS = {"paper": paper_reward, "logarithmic": logarithmic_reward}

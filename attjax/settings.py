@@ -1,0 +1,138 @@
+"""Everything that defines a training run, in one flat frozen dataclass.
+
+This module imports nothing heavy, so that ``--help`` is instant.
+"""
+
+import dataclasses
+import math
+
+
+def setting(help: str, **limits):
+    """A field without default. ``limits``: ``choices``, or ``low``, ``high`` (inclusive),
+    ``above`` and ``below`` (exclusive), of each element where the field is a tuple."""
+    return dataclasses.field(metadata={"help": help, **limits})
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Settings of a training run; ``presets.py`` gives the values.
+
+    Raises:
+        ValueError: a value is out of its range, or two values do not fit together.
+    """
+
+    # The task
+    frameskips: tuple[int, ...] = setting(
+        "torque-free RK4 steps after an impulse; the environments are shared out evenly "
+        "among several values", low=0, below=10_500)
+    reward: str = setting(
+        "Eq. 12-13 with terminal rewards, or -log10 of the error angle",
+        choices=("paper", "logarithmic"))
+    reward_scale: float = setting("factor on the reward the learner sees", above=0)
+    time_limit_terminates: bool = setting(
+        "learn the time limit as an end, as the paper did; otherwise bootstrap there")
+    stagger_episodes: bool = setting(
+        "start the first episodes at random times, so that they do not end all at once")
+
+    # The networks
+    features: str = setting(
+        "network inputs: Eq. 11 as it is, or tanh(k x) of attitude and rate at six scales",
+        choices=("state", "multiscale"))
+    hidden_sizes: tuple[int, ...] = setting("neurons of each hidden layer (Table 3)", low=1)
+    rate_margin: float = setting(
+        "mask actions that would lead above this fraction of the rate limit; 0: no mask",
+        low=0, high=1)
+
+    # PPO
+    total_steps: int = setting("agent steps in the whole run, rounded up to whole updates", low=1)
+    num_envs: int = setting("spacecraft simulated side by side", low=1)
+    rollout_length: int = setting("agent steps of each spacecraft between two updates", low=1)
+    passes: int = setting("passes over the data of an update (N)", low=1)
+    minibatch_size: int = setting("samples in a gradient step", low=1)
+    discount: float = setting("discount (gamma)", above=0, high=1)
+    discount_period: float = setting(
+        "time over which the discount applies, s; 0: an agent step, however long", low=0)
+    gae_lambda: float = setting("GAE's lambda; 1 is Eq. 5", low=0, high=1)
+    clip: float = setting("clipping parameter (epsilon, Eq. 4)", above=0, below=1)
+    entropy_coefficient: float = setting("weight of the entropy bonus (c)", low=0)
+    learning_rate: float = setting("Adam's learning rate at the start", above=0)
+    final_learning_rate: float = setting("and at the end; linear in between", low=0)
+    normalize_advantage: bool = setting("standardise the advantages of each minibatch")
+    max_gradient_norm: float = setting("clip each network's gradient norm; 0: do not", low=0)
+    updates_per_block: int = setting(
+        "updates between two progress lines, each a row of metrics.csv", low=1)
+
+    def __post_init__(self):
+        for field in dataclasses.fields(self):
+            _check(field, getattr(self, field.name))
+        if self.num_envs < len(self.frameskips):
+            raise ValueError(
+                f"num_envs is {self.num_envs}; it must be at least {len(self.frameskips)}, "
+                f"the number of frameskips"
+            )
+        if self.minibatch_size > self.steps_per_update:
+            raise ValueError(
+                f"minibatch_size is {self.minibatch_size}; it must be at most "
+                f"num_envs x rollout_length = {self.steps_per_update}"
+            )
+
+    @property
+    def steps_per_update(self) -> int:
+        """Agent steps that one update learns from."""
+        return self.num_envs * self.rollout_length
+
+    @property
+    def num_updates(self) -> int:
+        """Updates in the whole run."""
+        return -(-self.total_steps // self.steps_per_update)
+
+    @property
+    def minibatches(self) -> int:
+        """Gradient steps in a pass; samples beyond whole minibatches sit that pass out."""
+        return self.steps_per_update // self.minibatch_size
+
+
+def from_json(values: dict) -> Settings:
+    """Settings from what ``json.loads`` makes of ``dataclasses.asdict(settings)``.
+
+    Raises:
+        ValueError: a name is unknown or missing, or a value is out of range.
+    """
+    names = {field.name for field in dataclasses.fields(Settings)}
+    if set(values) != names:
+        wrong = sorted(set(values) ^ names)
+        raise ValueError(f"settings are unknown or missing: {', '.join(wrong)}")
+    return Settings(
+        **{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
+    )
+
+
+def describe_limits(metadata) -> str:
+    """The allowed values of a setting, for help texts and errors."""
+    if "choices" in metadata:
+        return "one of " + ", ".join(metadata["choices"])
+    words = {"low": "at least", "above": "above", "high": "at most", "below": "below"}
+    return " and ".join(f"{word} {metadata[k]}" for k, word in words.items() if k in metadata)
+
+
+def _check(field, value):
+    is_tuple = field.type == tuple[int, ...]
+    element_type = int if is_tuple else field.type
+    elements = value if is_tuple else (value,)
+    limits = field.metadata
+    valid = isinstance(elements, tuple) and len(elements) > 0
+    for x in elements if valid else ():
+        valid &= type(x) is element_type or (element_type is float and type(x) is int)
+        valid = valid and ("choices" not in limits or x in limits["choices"])
+        if valid and element_type in (int, float):
+            valid = (
+                math.isfinite(x)
+                and limits.get("low", x) <= x <= limits.get("high", x)
+                and not x <= limits.get("above", -math.inf)
+                and not x >= limits.get("below", math.inf)
+            )
+    if not valid:
+        kind = {int: "an integer", float: "a number", bool: "true or false"}.get(element_type, "")
+        kind = "integers" if is_tuple else kind
+        allowed = " ".join(filter(None, [kind, describe_limits(limits)]))
+        raise ValueError(f"{field.name} is {value!r}; it must be {allowed}")

@@ -1,0 +1,116 @@
+"""One spacecraft: its state, its parameters (Table 1, section 2.3) and the agent step."""
+
+import chex
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+
+from attjax import dynamics
+from attjax import quaternion as quaternions
+
+EPISODE_RK4_STEPS = 10_500
+"""RK4 steps in an episode of 43.75 s: 500 actions at frameskip 20, 1,750 at 5."""
+
+TORQUE_TABLE = np.concatenate(
+    [np.zeros((1, 3))]
+    + [
+        magnitude * sign * np.eye(3)[[axis]]
+        for magnitude in (0.5, 0.05, 0.005)
+        for axis in range(3)
+        for sign in (1, -1)
+    ]
+)
+"""Table 1: (19, 3) torque of each action, N m, body frame."""
+
+
+@struct.dataclass
+class EnvState:
+    """State of one spacecraft.
+
+    Attributes:
+        quaternion: (4,) error quaternion, scalar last.
+        angular_velocity: (3,) body frame, rad/s.
+        time: agent steps since the start of the episode, int32.
+    """
+
+    quaternion: chex.Array
+    angular_velocity: chex.Array
+    time: chex.Array
+
+
+@struct.dataclass
+class EnvParams:
+    """Parameters of the spacecraft and its task; all leaves can be traced and vmapped.
+
+    Attributes:
+        inertia: (3,) principal moments or (3, 3) symmetric tensor, kg m².
+        torque_table: (actions, 3) torque of each action, N m.
+        rate_limit: ‖ω‖ that ends the episode when exceeded, rad/s.
+        goal_angle: largest φ that counts as pointing, rad.
+        min_slew_angle, max_slew_angle: range of the initial φ, rad.
+        max_steps_in_episode: time limit, agent steps, int32.
+    """
+
+    inertia: chex.Array
+    torque_table: chex.Array
+    rate_limit: chex.Array
+    goal_angle: chex.Array
+    min_slew_angle: chex.Array
+    max_slew_angle: chex.Array
+    max_steps_in_episode: chex.Array
+
+
+def default_params(frameskip: int = 20) -> EnvParams:
+    """The paper's spacecraft and task, in JAX's default floating-point type."""
+    return EnvParams(
+        inertia=jnp.array(dynamics.LM50_INERTIA, float),
+        torque_table=jnp.array(TORQUE_TABLE, float),
+        rate_limit=jnp.array(0.5, float),
+        goal_angle=jnp.array(np.deg2rad(0.25), float),
+        min_slew_angle=jnp.array(np.deg2rad(30), float),
+        max_slew_angle=jnp.array(np.deg2rad(150), float),
+        max_steps_in_episode=jnp.array(EPISODE_RK4_STEPS // (frameskip + 1), jnp.int32),
+    )
+
+
+def initial_state(key: chex.PRNGKey, params: EnvParams) -> EnvState:
+    """A spacecraft at rest, turned by a uniform angle about a uniformly distributed axis."""
+    u = jax.random.uniform(key, (3,), params.inertia.dtype)
+    cosine, azimuth = 2 * u[0] - 1, 2 * jnp.pi * u[1]
+    sine = jnp.sqrt(1 - cosine**2)
+    axis = jnp.stack([sine * jnp.cos(azimuth), sine * jnp.sin(azimuth), cosine])
+    angle = params.min_slew_angle + u[2] * (params.max_slew_angle - params.min_slew_angle)
+    return EnvState(
+        quaternion=quaternions.from_axis_angle(axis, angle),
+        angular_velocity=jnp.zeros_like(axis),
+        time=jnp.zeros((), jnp.int32),
+    )
+
+
+def step(state: EnvState, action, params: EnvParams | None = None, frameskip: int = 20) -> EnvState:
+    """One agent step of one spacecraft: pure, keyless, without reset or end of episode.
+
+    Args:
+        state: the spacecraft before the step.
+        action: integer scalar, row of the torque table (Table 1).
+        params: spacecraft, the paper's by default.
+        frameskip: torque-free RK4 steps after the one with torque (static).
+
+    Returns:
+        The state (1 + frameskip)/240 s later.
+
+    Example:
+        >>> goal = EnvState(jnp.array([0.0, 0.0, 0.0, 1.0]), jnp.zeros(3), 0)
+        >>> round(float(step(goal, 1).angular_velocity[0]), 6)   # 0.5 N m for 1/240 s
+        0.002389
+    """
+    params = default_params(frameskip) if params is None else params
+    quaternion, angular_velocity = dynamics.propagate(
+        state.quaternion,
+        state.angular_velocity,
+        params.torque_table[action],
+        params.inertia,
+        frameskip,
+    )
+    return EnvState(quaternion, angular_velocity, state.time + 1)

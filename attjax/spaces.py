@@ -1,0 +1,53 @@
+"""Observation and action spaces, with the attributes that gymnax's have."""
+
+import dataclasses
+
+import chex
+import jax
+import jax.numpy as jnp
+
+
+@dataclasses.dataclass(frozen=True)
+class Discrete:
+    """The integers 0 to n − 1."""
+
+    n: int
+    shape = ()
+    dtype = jnp.int32
+
+    def sample(self, key: chex.PRNGKey) -> chex.Array:
+        """A uniformly random element, int32."""
+        return jax.random.randint(key, self.shape, 0, self.n, self.dtype)
+
+    def contains(self, x) -> chex.Array:
+        """Whether x is an integer of the space."""
+        x = jnp.asarray(x)
+        integral = jnp.issubdtype(x.dtype, jnp.integer) and x.shape == self.shape
+        return integral & (x >= 0) & (x < self.n)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Box:
+    """Real vectors between the arrays ``low`` and ``high``, bounds included."""
+
+    low: chex.Array
+    high: chex.Array
+
+    @property
+    def shape(self):
+        return self.low.shape
+
+    @property
+    def dtype(self):
+        return self.low.dtype
+
+    def sample(self, key: chex.PRNGKey) -> chex.Array:
+        """A uniformly random element."""
+        return jax.random.uniform(key, self.shape, self.dtype, self.low, self.high)
+
+    def contains(self, x) -> chex.Array:
+        """Whether x has the space's shape and lies within its bounds."""
+        x = jnp.asarray(x)
+        if x.shape != self.shape:
+            return jnp.array(False)
+        return jnp.all((x >= self.low) & (x <= self.high))
