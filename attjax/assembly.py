@@ -1,6 +1,8 @@
 """From settings to the objects that they describe."""
 
-from attjax import ppo
+import jax
+
+from attjax import learner
 from attjax.env import AttitudeEnv
 from attjax.networks import Policy
 from attjax.reward import REWARDS
@@ -16,8 +18,16 @@ def policy(settings: Settings) -> Policy:
     )
 
 
-def setup(settings: Settings) -> ppo.Setup:
+def setup(settings: Settings) -> learner.Setup:
     """Environments, policy and settings of a training run."""
     reward = REWARDS[settings.reward]
     envs = tuple(AttitudeEnv(frameskip, reward) for frameskip in settings.frameskips)
-    return ppo.Setup(envs, policy(settings), settings)
+    return learner.Setup(envs, policy(settings), settings)
+
+
+def initial_parameters(policy: Policy) -> dict:
+    """Parameters of the right shapes for a policy on the attitude environment."""
+    env = AttitudeEnv()
+    params = env.default_params
+    observation, _ = env.reset(jax.random.key(0), params)
+    return policy.init(jax.random.key(0), jax.random.key(1), observation, env.context(params))

@@ -7,7 +7,7 @@ import chex
 import jax
 import jax.numpy as jnp
 
-from attjax import dynamics, spaces, spacecraft
+from attjax import dynamics, spacecraft, spaces
 from attjax import observation as observations
 from attjax import quaternion as quaternions
 from attjax.context import Context
@@ -48,6 +48,7 @@ class AttitudeEnv:
 
     @property
     def num_actions(self) -> int:
+        """Rows of Table 1."""
         return len(TORQUE_TABLE)
 
     @property
@@ -57,6 +58,7 @@ class AttitudeEnv:
 
     @property
     def default_params(self) -> EnvParams:
+        """The paper's spacecraft and task at this frameskip."""
         return spacecraft.default_params(self.frameskip)
 
     def context(self, params: EnvParams) -> Context:

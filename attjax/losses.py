@@ -39,9 +39,7 @@ def generalized_advantages(
         advantage = delta + decay * advantage
         return advantage, advantage
 
-    _, advantages = jax.lax.scan(
-        backward, jnp.zeros_like(deltas[0]), (deltas, decay), reverse=True
-    )
+    _, advantages = jax.lax.scan(backward, jnp.zeros_like(deltas[0]), (deltas, decay), reverse=True)
     return advantages
 
 
@@ -53,9 +51,7 @@ def clipped_policy_loss(log_probability, old_log_probability, advantage, clip):
     """
     log_ratio = log_probability - old_log_probability
     ratio = jnp.exp(log_ratio)
-    objective = jnp.minimum(
-        ratio * advantage, jnp.clip(ratio, 1 - clip, 1 + clip) * advantage
-    )
+    objective = jnp.minimum(ratio * advantage, jnp.clip(ratio, 1 - clip, 1 + clip) * advantage)
     diagnostics = {
         "approximate_kl": jnp.mean(ratio - 1 - log_ratio),
         "clip_fraction": jnp.mean((jnp.abs(ratio - 1) > clip).astype(ratio.dtype)),

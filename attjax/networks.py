@@ -39,6 +39,7 @@ class MLP(nn.Module):
 
     @nn.compact
     def __call__(self, x):
+        """Map (..., inputs) to (..., outputs)."""
         for size in self.hidden_sizes:
             x = nn.relu(self._dense(size, 2**0.5)(x))
         return self._dense(self.outputs, self.output_scale)(x)
@@ -71,10 +72,12 @@ class Policy:
 
     @property
     def policy_network(self) -> MLP:
+        """From features to logits."""
         return MLP(self.hidden_sizes, self.num_actions, 0.01)
 
     @property
     def value_network(self) -> MLP:
+        """From features to V(s)."""
         return MLP(self.hidden_sizes, 1, 1.0)
 
     def init(self, policy_key, value_key, observation, context) -> dict:

@@ -39,6 +39,7 @@ class PaperFast(Paper):
     """The paper's state, reward, networks, γ, ε, c and learning rates; the rest is ours."""
 
     reward_scale: float = 0.01
+    stagger_episodes: bool = True
     total_steps: int = 12_000_000
     num_envs: int = 512
     rollout_length: int = 128

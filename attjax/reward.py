@@ -44,9 +44,7 @@ def scalar_part_increased(before: chex.Array, after: chex.Array) -> chex.Array:
     Within 0.04° of the goal float32 q_s no longer changes, so where both q_s > 0.5 (or
     both < −0.5) the sharper sin²(φ/2) = ‖q_v‖²/‖q‖² is compared instead.
     """
-    sine_before, sine_after = (
-        jnp.sum(q[:3] ** 2) / jnp.sum(q**2) for q in (before, after)
-    )
+    sine_before, sine_after = (jnp.sum(q[:3] ** 2) / jnp.sum(q**2) for q in (before, after))
     near_goal = (before[3] > 0.5) & (after[3] > 0.5)
     near_antipode = (before[3] < -0.5) & (after[3] < -0.5)
     return jnp.where(
@@ -73,9 +71,7 @@ def paper_reward(transition: Transition) -> chex.Array:
     improved = scalar_part_increased(transition.quaternion, transition.next_quaternion)
     shaped = jnp.exp(-angle / (0.14 * 2 * jnp.pi)) - jnp.where(improved, 0.0, 1.0)
     reward = shaped + jnp.where(inside, 9.0, 0.0)
-    reward = jnp.where(
-        transition.truncated, jnp.where(inside, TERMINAL_BONUS, 0.0), reward
-    )
+    reward = jnp.where(transition.truncated, jnp.where(inside, TERMINAL_BONUS, 0.0), reward)
     return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
 
 

@@ -9,7 +9,8 @@ import math
 
 def setting(help: str, **limits):
     """A field without default. ``limits``: ``choices``, or ``low``, ``high`` (inclusive),
-    ``above`` and ``below`` (exclusive), of each element where the field is a tuple."""
+    ``above`` and ``below`` (exclusive), of each element where the field is a tuple.
+    """
     return dataclasses.field(metadata={"help": help, **limits})
 
 
@@ -24,24 +25,33 @@ class Settings:
     # The task
     frameskips: tuple[int, ...] = setting(
         "torque-free RK4 steps after an impulse; the environments are shared out evenly "
-        "among several values", low=0, below=10_500)
+        "among several values",
+        low=0,
+        below=10_500,
+    )
     reward: str = setting(
         "Eq. 12-13 with terminal rewards, or -log10 of the error angle",
-        choices=("paper", "logarithmic"))
+        choices=("paper", "logarithmic"),
+    )
     reward_scale: float = setting("factor on the reward the learner sees", above=0)
     time_limit_terminates: bool = setting(
-        "learn the time limit as an end, as the paper did; otherwise bootstrap there")
+        "learn the time limit as an end, as the paper did; otherwise bootstrap there"
+    )
     stagger_episodes: bool = setting(
-        "start the first episodes at random times, so that they do not end all at once")
+        "start the first episodes at random times, so that they do not end all at once"
+    )
 
     # The networks
     features: str = setting(
         "network inputs: Eq. 11 as it is, or tanh(k x) of attitude and rate at six scales",
-        choices=("state", "multiscale"))
+        choices=("state", "multiscale"),
+    )
     hidden_sizes: tuple[int, ...] = setting("neurons of each hidden layer (Table 3)", low=1)
     rate_margin: float = setting(
         "mask actions that would lead above this fraction of the rate limit; 0: no mask",
-        low=0, high=1)
+        low=0,
+        high=1,
+    )
 
     # PPO
     total_steps: int = setting("agent steps in the whole run, rounded up to whole updates", low=1)
@@ -51,7 +61,8 @@ class Settings:
     minibatch_size: int = setting("samples in a gradient step", low=1)
     discount: float = setting("discount (gamma)", above=0, high=1)
     discount_period: float = setting(
-        "time over which the discount applies, s; 0: an agent step, however long", low=0)
+        "time over which the discount applies, s; 0: an agent step, however long", low=0
+    )
     gae_lambda: float = setting("GAE's lambda; 1 is Eq. 5", low=0, high=1)
     clip: float = setting("clipping parameter (epsilon, Eq. 4)", above=0, below=1)
     entropy_coefficient: float = setting("weight of the entropy bonus (c)", low=0)
@@ -60,11 +71,12 @@ class Settings:
     normalize_advantage: bool = setting("standardise the advantages of each minibatch")
     max_gradient_norm: float = setting("clip each network's gradient norm; 0: do not", low=0)
     updates_per_block: int = setting(
-        "updates between two progress lines, each a row of metrics.csv", low=1)
+        "updates between two progress lines, each a row of metrics.csv", low=1
+    )
 
     def __post_init__(self):
         for field in dataclasses.fields(self):
-            _check(field, getattr(self, field.name))
+            check(field, getattr(self, field.name))
         if self.num_envs < len(self.frameskips):
             raise ValueError(
                 f"num_envs is {self.num_envs}; it must be at least {len(self.frameskips)}, "
@@ -102,9 +114,7 @@ def from_json(values: dict) -> Settings:
     if set(values) != names:
         wrong = sorted(set(values) ^ names)
         raise ValueError(f"settings are unknown or missing: {', '.join(wrong)}")
-    return Settings(
-        **{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
-    )
+    return Settings(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
 
 
 def describe_limits(metadata) -> str:
@@ -115,7 +125,8 @@ def describe_limits(metadata) -> str:
     return " and ".join(f"{word} {metadata[k]}" for k, word in words.items() if k in metadata)
 
 
-def _check(field, value):
+def check(field: dataclasses.Field, value) -> None:
+    """Raise ValueError, naming what is allowed, unless ``value`` fits the setting."""
     is_tuple = field.type == tuple[int, ...]
     element_type = int if is_tuple else field.type
     elements = value if is_tuple else (value,)

@@ -34,11 +34,13 @@ class Box:
     high: chex.Array
 
     @property
-    def shape(self):
+    def shape(self) -> tuple[int, ...]:
+        """Shape of an element."""
         return self.low.shape
 
     @property
     def dtype(self):
+        """Type of an element's entries."""
         return self.low.dtype
 
     def sample(self, key: chex.PRNGKey) -> chex.Array:

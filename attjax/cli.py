@@ -1,0 +1,150 @@
+"""What train.py and eval.py share: arguments, one-line errors, devices, the compile cache."""
+
+import argparse
+import contextlib
+import dataclasses
+import functools
+import os
+import sys
+from pathlib import Path
+
+from attjax import presets, settings
+
+DEVICES = ("auto", "cpu", "gpu")
+BAD_INPUT = 2
+
+
+class UserError(Exception):
+    """Bad input; the message is one line that names what is wrong and what is allowed."""
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are one line, and exit status 2."""
+
+    def __init__(self, **options):
+        super().__init__(
+            allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **options
+        )
+
+    def error(self, message: str):
+        """Print the message as one line and exit."""
+        sys.exit(_print_error(self.prog, message))
+
+
+@contextlib.contextmanager
+def one_line_errors(prog: str, *kinds: type[Exception]):
+    """Turn exceptions of these kinds into one line on stderr and exit status 2."""
+    try:
+        yield
+    except (UserError, *kinds) as error:
+        sys.exit(_print_error(prog, error))
+
+
+def _print_error(prog, message):
+    print(f"{prog}: error: {' '.join(str(message).split())}", file=sys.stderr)
+    return BAD_INPUT
+
+
+def add_common(parser: argparse.ArgumentParser, seed_help: str) -> None:
+    """Add --checkpoint, --seed and --device."""
+    folder_help = "folder of the training run (default: ckpt)"
+    parser.add_argument(
+        "--checkpoint", type=Path, default=Path("ckpt"), metavar="FOLDER", help=folder_help
+    )
+    add_number(parser, "seed", int, None, seed_help, low=0, below=2**32)
+    device_help = "where to compute (default: auto, a GPU if JAX finds one)"
+    parser.add_argument("--device", choices=DEVICES, default="auto", help=device_help)
+
+
+def add_number(parser, name: str, kind: type, default, help: str, **limits) -> None:
+    """Add the flag of a number with limits, as in :func:`attjax.settings.setting`."""
+    field = settings.setting(help, **limits)
+    field.name, field.type = name, kind
+    parser.add_argument(
+        "--" + name,
+        type=_parser_of(field),
+        default=default,
+        metavar={int: "N", float: "X"}[kind],
+        help=help if default is None else f"{help} (default: {default})",
+    )
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """Add a flag for every setting; those not given are left out of the namespace."""
+    group = parser.add_argument_group("settings (defaults depend on the preset)")
+    for field in dataclasses.fields(settings.Settings):
+        flag = "--" + field.name.replace("_", "-")
+        defaults = ", ".join(
+            f"{name} {_show(getattr(preset(), field.name))}"
+            for name, preset in presets.PRESETS.items()
+        )
+        options = {"default": argparse.SUPPRESS, "help": f"{field.metadata['help']} ({defaults})"}
+        if field.type is bool:
+            group.add_argument(flag, action=argparse.BooleanOptionalAction, **options)
+        else:
+            metavar = "|".join(field.metadata.get("choices", ())) or (
+                {int: "N", float: "X"}.get(field.type, "N,N,...")
+            )
+            group.add_argument(flag, type=_parser_of(field), metavar=metavar, **options)
+
+
+def _parser_of(field):
+    """An argparse type that parses and checks values of a setting."""
+    return functools.partial(_parse, field)
+
+
+def _parse(field, text):
+    try:
+        if field.type == tuple[int, ...]:
+            value = tuple(int(part) for part in text.split(","))
+        else:
+            value = field.type(text)
+    except ValueError:
+        value = text
+    try:
+        settings.check(field, value)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return value
+
+
+def _show(value):
+    if isinstance(value, tuple):
+        return ",".join(map(str, value))
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return value
+
+
+def overrides(arguments: argparse.Namespace) -> dict:
+    """The settings that were given on the command line."""
+    names = {field.name for field in dataclasses.fields(settings.Settings)}
+    return {name: value for name, value in vars(arguments).items() if name in names}
+
+
+def select_device(name: str):
+    """The JAX device for ``--device``, made the default; also turns the compile cache on.
+
+    Raises:
+        UserError: there is no such device.
+    """
+    import jax
+
+    if name == "cpu":
+        jax.config.update("jax_platforms", "cpu")
+    jax.config.update("jax_compilation_cache_dir", str(cache_folder()))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
+    try:
+        device = jax.devices(None if name == "auto" else name)[0]
+    except RuntimeError:
+        raise UserError(
+            f"--device is {name}, and JAX finds none; it finds {jax.default_backend()}"
+        ) from None
+    jax.config.update("jax_default_device", device)
+    return device
+
+
+def cache_folder() -> Path:
+    """Where compiled programs are kept between runs: the user's cache folder."""
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "attjax" / "compiled"

@@ -1,0 +1,141 @@
+"""Statistics of a controller over many slews (Table 2)."""
+
+import functools
+from collections.abc import Callable
+
+import chex
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+
+from attjax import dynamics
+from attjax import quaternion as quaternions
+from attjax.context import Context
+from attjax.env import AttitudeEnv
+from attjax.spacecraft import EnvParams
+
+Controller = Callable[[chex.Array, Context], chex.Array]
+"""``act(observation (11,), context) -> action``; a pytree, e.g. ``jax.tree_util.Partial``."""
+
+STATISTICS = ("mean", "std", "min", "q1", "q2", "q3", "max")
+
+
+@struct.dataclass
+class Episodes:
+    """Outcome of each episode; fields are (episodes,). The start is not sampled.
+
+    Attributes:
+        closest_angle, closest_rate: φ, rad, and ‖ω‖, rad/s, when φ was smallest.
+        terminal_angle, terminal_rate: the same at the last step.
+        overspeed: whether the rate limit was exceeded, which ends the episode.
+        last_outside: last step, counted from 1, with φ above the goal angle; 0 if none.
+        score: return of Eq. 12–13.
+        impulse: sum of the torque magnitudes times their duration, N m s.
+    """
+
+    closest_angle: chex.Array
+    closest_rate: chex.Array
+    terminal_angle: chex.Array
+    terminal_rate: chex.Array
+    overspeed: chex.Array
+    last_outside: chex.Array
+    score: chex.Array
+    impulse: chex.Array
+
+
+@functools.partial(jax.jit, static_argnames=("env", "episodes"))
+def fly(
+    controller: Controller, env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, episodes: int
+) -> Episodes:
+    """Fly ``episodes`` random slews of ``params.max_steps_in_episode`` steps each."""
+    observation, state = jax.vmap(env.reset, (0, None))(jax.random.split(key, episodes), params)
+    context = env.context(params)
+
+    def step(index, carry):
+        observation, state, so_far = carry
+        action = jax.vmap(controller, (0, None))(observation, context)
+        next_observation, next_state, _, terminated, info = jax.vmap(
+            env.step_env, (None, 0, 0, None)
+        )(key, state, action, params)
+        angle = jax.vmap(quaternions.error_angle)(next_state.quaternion)
+        rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2, axis=-1))
+        torque = jnp.sqrt(jnp.sum(params.torque_table[action] ** 2, axis=-1))
+        closer = angle < so_far.closest_angle
+        updated = Episodes(
+            closest_angle=jnp.where(closer, angle, so_far.closest_angle),
+            closest_rate=jnp.where(closer, rate, so_far.closest_rate),
+            terminal_angle=angle,
+            terminal_rate=rate,
+            overspeed=terminated,
+            last_outside=jnp.where(angle > params.goal_angle, index + 1, so_far.last_outside),
+            score=so_far.score + info["score"],
+            impulse=so_far.impulse + torque * dynamics.INTEGRATION_STEP,
+        )
+        ended = so_far.overspeed
+        so_far = jax.tree.map(lambda old, new: jnp.where(ended, old, new), so_far, updated)
+        return next_observation, next_state, so_far
+
+    zero = jnp.zeros(episodes, observation.dtype)
+    start = Episodes(zero + jnp.inf, zero, zero, zero, zero > 0, zero.astype(jnp.int32), zero, zero)
+    steps = params.max_steps_in_episode
+    return jax.lax.fori_loop(0, steps, step, (observation, state, start))[2]
+
+
+def evaluate(
+    controller: Controller, env: AttitudeEnv, params: EnvParams, seed: int, episodes: int
+) -> dict:
+    """Fly random slews and summarise them.
+
+    Args:
+        controller: see :data:`Controller`.
+        env: its frameskip is the control rate; its reward is not used.
+        params: spacecraft and task; ``max_steps_in_episode`` is the length of the episodes.
+        seed: of the initial slews.
+        episodes: number of slews.
+
+    Returns:
+        The statistics that ``eval.py --json`` writes; success is φ within the goal angle at
+        the end without having exceeded the rate limit. Settling times are those of the
+        episodes that settle; the others are counted in ``never``.
+    """
+    flown = fly(controller, env, params, jax.random.key(seed), episodes)
+    flown = jax.tree.map(lambda x: np.asarray(x).astype(float), flown)
+    steps = int(params.max_steps_in_episode)
+    inside = flown.terminal_angle <= float(params.goal_angle)
+    overspeed = flown.overspeed > 0
+    success = inside & ~overspeed
+    settling = (flown.last_outside[success] + 1) * env.control_period
+    return {
+        "episodes": episodes,
+        "frameskip": env.frameskip,
+        "control_hz": 1 / env.control_period,
+        "duration_s": steps * env.control_period,
+        "seed": seed,
+        "success_rate": float(np.mean(success)),
+        "overspeed_rate": float(np.mean(overspeed)),
+        "closest": _pointing(flown.closest_angle, flown.closest_rate),
+        "terminal": _pointing(flown.terminal_angle, flown.terminal_rate),
+        "terminal_success": _pointing(flown.terminal_angle[success], flown.terminal_rate[success]),
+        "settling_time_s": summarize(settling) | {"never": episodes - len(settling)},
+        "episode_return": summarize(flown.score),
+        "impulse_N_m_s": summarize(flown.impulse),
+    }
+
+
+def summarize(x: np.ndarray) -> dict:
+    """Mean, standard deviation, extremes and quartiles; all None for no samples.
+
+    Example:
+        >>> summarize(np.array([1.0, 2.0, 3.0]))["q2"]
+        2.0
+    """
+    if len(x) == 0:
+        return dict.fromkeys(STATISTICS)
+    quartiles = np.quantile(x, [0, 0.25, 0.5, 0.75, 1])
+    values = [np.mean(x), np.std(x), *quartiles]
+    return {name: float(value) for name, value in zip(STATISTICS, values)}
+
+
+def _pointing(angle, rate):
+    return {"error_deg": summarize(np.rad2deg(angle)), "rate_rad_s": summarize(rate)}

@@ -1,0 +1,128 @@
+"""How a training run shows itself: a live line, or plain lines, and metrics.csv."""
+
+import csv
+import io
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.live import Live
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+METRICS = "metrics.csv"
+COLUMNS = (
+    "agent_steps", "wall_s", "episodes", "episode_return", "episode_return_std",
+    "episode_return_n", "success_rate", "overspeed_rate", "terminal_error_deg",
+    "entropy", "approximate_kl", "clip_fraction", "policy_loss", "value_loss",
+    "explained_variance",
+)  # fmt: skip
+
+
+def metrics_row(metrics: dict, agent_steps: int, wall_s: float) -> dict:
+    """One row of metrics.csv from what ``ppo.train_block`` returns.
+
+    Rates and the error are means over all episodes that ended; the return (Eq. 12–13) is
+    that of the slowest control rate, the paper's, as returns of several rates do not
+    compare. Cells are None where no episode ended.
+    """
+    sums = {name: np.asarray(x, float) for name, x in metrics["episodes"].items()}
+    episodes, slowest = sums["episodes"].sum(), sums["episodes"][-1]
+    row = {"agent_steps": agent_steps, "wall_s": round(wall_s, 2), "episodes": int(episodes)}
+    for name in ("success_rate", "overspeed_rate", "terminal_error_deg"):
+        row[name] = sums[name].sum() / episodes if episodes else None
+    row["episode_return_n"] = int(slowest)
+    row["episode_return"] = row["episode_return_std"] = None
+    if slowest:
+        mean = sums["score"][-1] / slowest
+        variance = max(sums["score_squared"][-1] / slowest - mean**2, 0.0)
+        row |= {"episode_return": mean, "episode_return_std": variance**0.5}
+    return row | {name: float(x) for name, x in metrics["losses"].items()}
+
+
+class MetricsFile:
+    """Appends rows to metrics.csv; each is on disk when ``append`` returns."""
+
+    def __init__(self, folder: Path, resume_at: int):
+        """Open the file, dropping the rows after ``resume_at`` agent steps."""
+        self._path = folder / METRICS
+        rows = []
+        if self._path.exists():
+            with self._path.open(newline="") as file:
+                rows = [r for r in csv.DictReader(file) if int(r["agent_steps"]) <= resume_at]
+        self.wall_s = float(rows[-1]["wall_s"]) if rows else 0.0
+        temporary = self._path.with_suffix(".csv.tmp")
+        temporary.write_text(_csv_text(rows, header=True))
+        os.replace(temporary, self._path)
+
+    def append(self, row: dict) -> None:
+        """Add one row."""
+        with self._path.open("a", newline="") as file:
+            file.write(_csv_text([{k: _cell(v) for k, v in row.items()}]))
+
+
+def _cell(value):
+    return f"{value:.7g}" if isinstance(value, float) else value
+
+
+def _csv_text(rows, header=False):
+    text = io.StringIO()
+    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    if header:
+        writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+class ProgressLine:
+    """A live progress line on a terminal, plain lines elsewhere; a context manager."""
+
+    def __init__(self, total_steps: int, done_steps: int):
+        self._total, self._start_steps = total_steps, done_steps
+        self._console = Console(highlight=False)
+        self._progress = Progress(
+            BarColumn(bar_width=20),
+            TextColumn("{task.fields[text]}"),
+            TextColumn("ETA"),
+            TimeRemainingColumn(compact=True),
+            console=self._console,
+        )
+        self._task = self._progress.add_task(
+            "", total=total_steps, completed=done_steps, text="first block"
+        )
+        is_terminal = self._console.is_terminal
+        self._live = Live(self._progress, console=self._console) if is_terminal else None
+
+    def __enter__(self):
+        self._start = time.monotonic()
+        if self._live:
+            self._live.__enter__()
+        return self
+
+    def __exit__(self, *exception):
+        if self._live:
+            self._live.__exit__(*exception)
+
+    def show(self, row: dict) -> None:
+        """Show a row of metrics."""
+        steps, elapsed = row["agent_steps"], time.monotonic() - self._start
+        rate = (steps - self._start_steps) / max(elapsed, 1e-9)
+        text = (
+            f"{steps / 1e6:.2f}M/{self._total / 1e6:.2f}M steps  {_thousands(rate)} steps/s  "
+            f"return {_number(row['episode_return'], '.0f')}  "
+            f"success {_number(row['success_rate'], '.1%')}  "
+            f"error {_number(row['terminal_error_deg'], '.3g')}°"
+        )
+        self._progress.update(self._task, completed=steps, text=text)
+        if not self._live:
+            remaining = (self._total - steps) / rate
+            print(f"{text}  ETA {remaining // 60:.0f}:{remaining % 60:02.0f}", flush=True)
+
+
+def _number(value, form):
+    return "–" if value is None else format(value, form)
+
+
+def _thousands(rate):
+    return f"{rate / 1e3:.0f}k" if rate >= 1e4 else f"{rate:.0f}"

@@ -1,0 +1,80 @@
+"""Judge a trained attitude controller over random slews, as in the paper's Table 2.
+
+Example:
+    python eval.py --checkpoint ckpt/
+    python eval.py --checkpoint ckpt/ --frameskip 20 --json result.json
+"""
+
+import json
+import sys
+import time
+from pathlib import Path
+
+from attjax import cli
+
+
+def parse_arguments(argv):
+    parser = cli.Parser(prog="eval.py", description=__doc__)
+    cli.add_common(parser, seed_help="of the initial slews (default: 0)")
+    cli.add_number(parser, "episodes", int, 5000, "number of slews", low=1, high=10**7)
+    frameskip_help = "torque-free RK4 steps after an impulse; the control rate is 240/(N + 1) Hz"
+    cli.add_number(parser, "frameskip", int, 5, frameskip_help, low=0, below=10_500)
+    cli.add_number(parser, "duration", float, 43.75, "length of an episode, s", above=0, high=1e6)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the statistics here")
+    return parser.parse_args(argv)
+
+
+def main(argv=None) -> int:
+    """Evaluate a checkpoint; returns the exit status."""
+    arguments = parse_arguments(argv)
+    with cli.one_line_errors("eval.py"):
+        cli.select_device(arguments.device)
+        steps = _episode_steps(arguments.duration, arguments.frameskip)
+
+    # Imported late: with them, --help and errors in the arguments would take seconds.
+    import jax.numpy as jnp
+
+    from attjax import AttitudeEnv, checkpoint, evaluation, report
+
+    with cli.one_line_errors("eval.py", checkpoint.CheckpointError):
+        controller = checkpoint.restore_policy(arguments.checkpoint)
+        _check_writable(arguments.json)
+    env = AttitudeEnv(arguments.frameskip)
+    params = env.default_params.replace(max_steps_in_episode=jnp.array(steps, jnp.int32))
+    start = time.monotonic()
+    result = {"controller": "policy"} | evaluation.evaluate(
+        controller, env, params, arguments.seed or 0, arguments.episodes
+    )
+    report.print_report(result)
+    print(f"evaluated in {time.monotonic() - start:.1f} s, compilation included")
+    if arguments.json:
+        arguments.json.write_text(json.dumps(result, indent=2) + "\n")
+    return 0
+
+
+def _episode_steps(duration, frameskip):
+    """Whole agent steps in the duration; 43.75 s at frameskip 5 are 1,750."""
+    steps = int(duration * 240 / (frameskip + 1) + 1e-6)
+    if not 1 <= steps < 2**31:
+        raise cli.UserError(
+            f"--duration is {duration} s; it must hold at least one agent step of "
+            f"{(frameskip + 1) / 240:.4g} s, and fewer than 2^31"
+        )
+    return steps
+
+
+def _check_writable(path):
+    """Fail before the work rather than after it; leaves no new file behind."""
+    if path is None:
+        return
+    existed = path.exists()
+    try:
+        path.open("a").close()
+    except OSError as error:
+        raise cli.UserError(f"--json {path} cannot be written: {error.strerror}") from None
+    if not existed:
+        path.unlink()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
