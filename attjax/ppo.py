@@ -42,9 +42,10 @@ def train_block(setup: Setup, env_params: tuple, learner: Learner, num_updates):
 
     def body(_, carry):
         learner, totals, diverged = carry
+        index = learner.update
         learner, metrics, finite = update(setup, env_params, learner)
         diverged = {
-            name: jnp.where((diverged[name] < 0) & ~ok, learner.update, diverged[name])
+            name: jnp.where((diverged[name] < 0) & ~ok, index, diverged[name])
             for name, ok in finite.items()
         }
         return learner, jax.tree.map(jnp.add, totals, metrics), diverged

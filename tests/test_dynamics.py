@@ -1,0 +1,196 @@
+"""Dynamics against SciPy, conservation laws, closed forms and the order of RK4."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from attjax import dynamics
+
+pytestmark = pytest.mark.usefixtures("strict_promotion")
+
+LM50 = np.array(dynamics.LM50_INERTIA)
+NO_TORQUE = np.zeros(3)
+START = np.array([0.1, -0.5, 0.3, 0.8, 0.2, -0.3, 0.25])  # q (made unit below), ω
+START[:4] /= np.linalg.norm(START[:4])
+
+
+def reference(start, duration, torque=NO_TORQUE, inertia=LM50):
+    """DOP853 on Eq. 6 and 9 written with matrices; independent of the code under test."""
+    inertia = np.diag(inertia) if np.ndim(inertia) == 1 else np.asarray(inertia)
+
+    def rate(_, y):
+        q, w = y[:4], y[4:]
+        vector = 0.5 * (q[3] * w + np.cross(q[:3], w))
+        return [
+            *vector,
+            -0.5 * q[:3] @ w,
+            *np.linalg.solve(inertia, torque - np.cross(w, inertia @ w)),
+        ]
+
+    solution = solve_ivp(rate, (0, duration), start, "DOP853", rtol=1e-13, atol=1e-15)
+    return solution.y[:, -1]
+
+
+def integrate(start, steps, dt, torque=NO_TORQUE, inertia=LM50):
+    """``steps`` calls of rk4_step."""
+
+    def body(_, state):
+        return dynamics.rk4_step(*state, jnp.asarray(torque), jnp.asarray(inertia), dt)
+
+    state = (jnp.asarray(start[:4]), jnp.asarray(start[4:]))
+    return np.concatenate(jax.lax.fori_loop(0, steps, body, state))
+
+
+def rotated_inertia():
+    rotation = Rotation.from_rotvec([0.4, -0.7, 0.2]).as_matrix()
+    return rotation @ np.diag(LM50) @ rotation.T
+
+
+@pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
+@pytest.mark.parametrize("torque", [np.zeros(3), np.array([0.05, -0.005, 0.02])])
+def test_agrees_with_dop853(x64, inertia, torque):
+    ours = integrate(START, 480, 1 / 240, torque, inertia)
+    expected = reference(START, 2.0, torque, inertia)
+    np.testing.assert_allclose(ours, expected, atol=1e-10)
+
+
+def test_order_of_convergence_is_four(x64):
+    torque = np.array([0.02, -0.01, 0.03])
+    expected = reference(START, 2.0, torque)
+    steps = np.array([20, 40, 80, 160])
+    errors = [np.abs(integrate(START, n, 2.0 / n, torque) - expected).max() for n in steps]
+    order = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert order == pytest.approx(4.0, abs=0.1)
+
+
+@pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
+def test_free_rotation_conserves_energy_and_inertial_momentum(x64, inertia):
+    matrix = np.diag(inertia) if inertia.ndim == 1 else inertia
+    q, w = jnp.asarray(START[:4]), jnp.asarray(START[4:])
+    agent_step = jax.jit(dynamics.propagate, static_argnums=4)
+    later_q, later_w = q, w
+    for _ in range(500):
+        later_q, later_w = agent_step(later_q, later_w, jnp.zeros(3), jnp.asarray(inertia), 20)
+
+    def energy(w):
+        return float(0.5 * w @ matrix @ w)
+
+    def momentum(q, w):  # in the desired frame, which is inertial
+        return Rotation.from_quat(np.asarray(q)).apply(matrix @ np.asarray(w))
+
+    assert energy(later_w) == pytest.approx(energy(w), rel=1e-10)
+    np.testing.assert_allclose(momentum(later_q, later_w), momentum(q, w), atol=1e-10)
+
+
+def test_axisymmetric_body_precesses_as_in_the_closed_form(x64):
+    """I1 = I2: ω3 is constant and (ω1, ω2) turns at λ = (I3 − I1) ω3 / I1."""
+    inertia = np.array([0.8, 0.8, 0.3])
+    w = np.array([0.2, 0.1, 0.4])
+    duration = 10.0
+    angle = (inertia[2] - inertia[0]) / inertia[0] * w[2] * duration
+    expected = [
+        w[0] * np.cos(angle) - w[1] * np.sin(angle),
+        w[0] * np.sin(angle) + w[1] * np.cos(angle),
+        w[2],
+    ]
+    start = np.array([0, 0, 0, 1, *w])
+    np.testing.assert_allclose(
+        integrate(start, 2400, 1 / 240, inertia=inertia)[4:], expected, atol=1e-11
+    )
+
+
+def test_spin_about_a_principal_axis_turns_by_rate_times_time(x64):
+    rate, duration = 0.3, 5.0
+    q = integrate(np.array([0, 0, 0, 1, 0, rate, 0.0]), 1200, 1 / 240)[:4]
+    half = rate * duration / 2
+    np.testing.assert_allclose(q, [0, np.sin(half), 0, np.cos(half)], atol=1e-13)
+
+
+def test_rk4_step_does_not_normalise(x64):
+    step = jax.jit(dynamics.rk4_step)
+    once, _ = step(*map(jnp.asarray, (START[:4], START[4:], np.zeros(3), LM50)), 1.0)
+    doubled, _ = step(*map(jnp.asarray, (2 * START[:4], START[4:], np.zeros(3), LM50)), 1.0)
+    assert abs(float(jnp.linalg.norm(once)) - 1) > 1e-7
+    np.testing.assert_allclose(doubled, 2 * once, rtol=1e-14)
+
+
+def test_one_normalisation_equals_one_each_step(x64):
+    q, w = jnp.asarray(START[:4]), jnp.asarray(START[4:])
+    torque, inertia = jnp.array([0.0, 0.5, 0.0]), jnp.asarray(LM50)
+    ours, _ = dynamics.propagate(q, w, torque, inertia, 20)
+    for index in range(21):
+        q, w = dynamics.rk4_step(q, w, torque if index == 0 else jnp.zeros(3), inertia, 1 / 240)
+        q = q / jnp.linalg.norm(q)
+    np.testing.assert_allclose(ours, q, atol=1e-15)
+
+
+@pytest.mark.parametrize("frameskip", [0, 1, 5, 20])
+def test_propagate_is_an_impulse_and_free_steps(x64, frameskip):
+    torque = np.array([0.5, 0.0, 0.0])
+    q, w = dynamics.propagate(*map(jnp.asarray, (START[:4], START[4:], torque, LM50)), frameskip)
+    expected = (
+        reference(reference(START, 1 / 240, torque), frameskip / 240)
+        if frameskip
+        else (reference(START, 1 / 240, torque))
+    )
+    np.testing.assert_allclose(np.concatenate([q, w]), expected, atol=1e-11)
+
+
+@pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
+def test_rate_after_impulse_is_the_integrated_one_to_first_order(x64, inertia):
+    torques = np.array([[0.5, 0, 0], [0, -0.05, 0], [0, 0, 0]])
+    predicted = dynamics.rate_after_impulse(START[4:], jnp.asarray(torques), jnp.asarray(inertia))
+    for torque, rate in zip(torques, predicted):
+        exact = reference(START, 1 / 240, torque, inertia)[4:]
+        np.testing.assert_allclose(rate, exact, atol=2e-3)
+        coasted = reference(START, 1 / 240, inertia=inertia)[4:]
+        np.testing.assert_allclose(rate - START[4:], exact - coasted, atol=1e-4)
+
+
+@pytest.mark.parametrize("frameskip", [5, 20])
+def test_float32_stays_close_to_float64(frameskip):
+    """200 sequences of 500 random actions."""
+    rng = np.random.default_rng(0)
+    axes = rng.normal(size=(200, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    half = np.deg2rad(rng.uniform(30, 150, (200, 1))) / 2
+    start = np.hstack([axes * np.sin(half), np.cos(half)]).astype(np.float32)
+    torques = np.zeros((500, 200, 3), np.float32)
+    index = np.meshgrid(range(500), range(200), indexing="ij")
+    torques[(*index, rng.integers(0, 3, (500, 200)))] = rng.choice(
+        [0.5, -0.5, 0.05, -0.05, 0.005, -0.005, 0.0], (500, 200)
+    )
+
+    def history(dtype):
+        inertia = jnp.array(LM50, dtype)
+
+        def step(state, torque):
+            state = jax.vmap(dynamics.propagate, (0, 0, 0, None, None))(
+                *state, torque, inertia, frameskip
+            )
+            return state, state
+
+        state = (jnp.array(start, dtype), jnp.zeros((200, 3), dtype))
+        run = jax.jit(lambda: jax.lax.scan(step, state, jnp.array(torques, dtype))[1])
+        return [np.asarray(x, np.float64) for x in run()]
+
+    single = history(jnp.float32)
+    with jax.enable_x64(True):
+        double = history(jnp.float64)
+    q_error, w_error = (np.abs(a - b).max(axis=(0, 2)) for a, b in zip(single, double))
+    assert np.median(q_error) <= 1e-5 and q_error.max() <= 1e-4
+    assert np.median(w_error) <= 1e-6 and w_error.max() <= 1e-5
+
+
+def test_wrong_shapes_and_mixed_types_are_refused():
+    q, w, torque = jnp.array([0.0, 0, 0, 1]), jnp.zeros(3), jnp.zeros(3)
+    inertia = jnp.array(LM50)
+    with pytest.raises(AssertionError, match="shape"):
+        dynamics.rk4_step(q[:3], w, torque, inertia)
+    with pytest.raises(AssertionError, match="shape"):
+        dynamics.rk4_step(q, w, torque, jnp.ones((3, 2)))
+    with pytest.raises(AssertionError, match="type"):
+        dynamics.rk4_step(q, w.astype(jnp.float16), torque, inertia)

@@ -1,0 +1,85 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from attjax import AttitudeEnv, networks, observation
+from attjax.networks import Policy
+
+pytestmark = pytest.mark.usefixtures("strict_promotion")
+
+ENV = AttitudeEnv(frameskip=5)
+CONTEXT = ENV.context(ENV.default_params)
+
+
+def observe(angular_velocity, quaternion=(0.0, 0.0, 0.0, 1.0)):
+    return observation.observe(jnp.array(quaternion), jnp.array(angular_velocity, float))
+
+
+def parameters(policy, seed=0):
+    keys = jax.random.split(jax.random.key(seed))
+    return policy.init(*keys, observe([0, 0, 0]), CONTEXT)
+
+
+def test_sizes_are_table_3():
+    params = parameters(Policy())
+    for name, outputs in (("policy", 19), ("value", 1)):
+        kernels = [layer["kernel"].shape for layer in params[name]["params"].values()]
+        assert kernels == [(11, 400), (400, 300), (300, outputs)]
+
+
+def test_multiscale_features_resolve_every_decade():
+    """A change of 1 % at any distance from the goal moves some feature by 1e-3 or more."""
+    for magnitude in 10.0 ** np.arange(-6, 0):
+        a = networks.multiscale_features(observe([magnitude, 0, 0]), CONTEXT.control_period)
+        b = networks.multiscale_features(observe([1.01 * magnitude, 0, 0]), CONTEXT.control_period)
+        assert a.shape == (39,)
+        assert float(jnp.abs(a - b).max()) > (1e-3 if magnitude > 1e-5 else 1e-4)
+        assert float(jnp.abs(a).max()) <= 3
+
+
+def test_mask_removes_exactly_the_actions_beyond_the_limit(x64):
+    rng = np.random.default_rng(0)
+    context = ENV.context(ENV.default_params)
+    table, inertia = np.asarray(context.torque_table), np.asarray(context.inertia)
+    limited = 0
+    for _ in range(200):
+        w = rng.normal(size=3)
+        w *= rng.uniform(0.40, 0.52) / np.linalg.norm(w)
+        after = np.linalg.norm(w + table / inertia / 240, axis=1)
+        expected = (after <= max(0.45, np.linalg.norm(w))) | (np.arange(19) == 0)
+        ours = networks.rate_mask(observe(w), context, 0.9)
+        np.testing.assert_array_equal(ours, expected)
+        limited += not expected.all()
+    assert limited > 50
+
+
+def test_masked_actions_are_never_taken():
+    policy = Policy(rate_margin=0.9, hidden_sizes=(8,))
+    params = parameters(policy)
+    inputs = policy.encode(observe([0.449, 0, 0]), CONTEXT)
+    assert not inputs.allowed[1] and inputs.allowed[2]
+    log_probabilities = policy.log_probabilities(params, inputs)
+    assert float(jnp.exp(log_probabilities).sum()) == pytest.approx(1, rel=1e-5)
+    assert jnp.exp(log_probabilities[1]) == 0
+    actions = jax.random.categorical(jax.random.key(0), log_probabilities, shape=(10_000,))
+    assert inputs.allowed[actions].all()
+    assert inputs.allowed[policy.act(params, observe([0.449, 0, 0]), CONTEXT)]
+
+
+def test_act_is_the_most_probable_action_at_any_rate():
+    policy = Policy(features="multiscale", hidden_sizes=(16,))
+    params = parameters(policy)
+    for frameskip in (5, 20):
+        env = AttitudeEnv(frameskip)
+        context = env.context(env.default_params)
+        inputs = policy.encode(observe([0.1, 0.2, 0.0]), context)
+        expected = jnp.argmax(policy.log_probabilities(params, inputs))
+        assert policy.act(params, observe([0.1, 0.2, 0.0]), context) == expected
+
+
+def test_networks_follow_the_default_float_type(x64):
+    policy = Policy(features="multiscale", hidden_sizes=(8,))
+    context = ENV.context(ENV.default_params)
+    params = policy.init(*jax.random.split(jax.random.key(0)), observe([0, 0, 0]), context)
+    assert {x.dtype for x in jax.tree.leaves(params)} == {jnp.dtype("float64")}

@@ -1,0 +1,192 @@
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from probes import Probe
+
+from attjax import assembly, learner, ppo, presets
+from attjax.networks import Policy
+
+SMALL = {
+    "num_envs": 64,
+    "rollout_length": 16,
+    "minibatch_size": 128,
+    "hidden_sizes": (32, 32),
+    "reward_scale": 1.0,
+    "learning_rate": 3e-3,
+    "final_learning_rate": 3e-4,
+    "updates_per_block": 1,
+}
+
+
+def settings(updates, preset=presets.PaperFast, **overrides):
+    values = SMALL | overrides
+    steps = values["num_envs"] * values["rollout_length"] * updates
+    return preset(total_steps=steps, **values)
+
+
+def train(setup, seed=0):
+    env_params = tuple(env.default_params for env in setup.envs)
+    state = learner.init(setup, env_params, jax.random.key(seed))
+    return ppo.train_block(setup, env_params, state, setup.settings.num_updates)
+
+
+def train_probe(probe, updates=60, **overrides):
+    policy = Policy(hidden_sizes=(32, 32), num_actions=2)
+    setup = learner.Setup((probe,), policy, settings(updates, **overrides))
+    state, _ = train(setup)
+
+    def value(*observation):
+        return float(policy.value(state.params, jnp.array(observation, float)))
+
+    def probability(action, *observation):
+        inputs = policy.encode(jnp.array(observation, float), None)
+        return float(jnp.exp(policy.log_probabilities(state.params, inputs))[action])
+
+    return value, probability
+
+
+def test_value_of_a_constant_reward():
+    value, _ = train_probe(Probe("constant"))
+    assert value(1, 0) == pytest.approx(1, abs=0.05)
+
+
+def test_value_that_depends_on_the_observation():
+    value, _ = train_probe(Probe("sign"))
+    assert value(1, 0) == pytest.approx(1, abs=0.05)
+    assert value(-1, 0) == pytest.approx(-1, abs=0.05)
+
+
+def test_value_of_a_delayed_reward_is_discounted():
+    value, _ = train_probe(Probe("last", length=3), discount=0.8)
+    for step in range(3):
+        assert value(1, step / 3) == pytest.approx(0.8 ** (2 - step), abs=0.07)
+
+
+def test_actions_follow_the_advantage():
+    _, probability = train_probe(Probe("match"))
+    assert probability(1, 1, 0) > 0.95
+    assert probability(0, -1, 0) > 0.95
+
+
+def test_value_bootstraps_at_the_time_limit_where_asked():
+    """1 a step for ever is worth 1/(1 − γ) = 5, but only 2.44 if the 3rd step is the last."""
+    endless = Probe("constant", length=3, truncates=True, shows_time=False)
+    value, _ = train_probe(endless, discount=0.8, time_limit_terminates=False, updates=150)
+    assert value(1, 0) == pytest.approx(5, abs=0.1)
+    limited = Probe("constant", length=3, truncates=True)
+    value, _ = train_probe(limited, discount=0.8, time_limit_terminates=True)
+    assert value(1, 0) == pytest.approx(1 + 0.8 + 0.64, abs=0.15)
+
+
+def test_value_does_not_bootstrap_over_a_termination():
+    value, _ = train_probe(Probe("constant", length=3), discount=0.8, time_limit_terminates=False)
+    assert value(1, 2 / 3) == pytest.approx(1, abs=0.1)
+
+
+def small_attitude_setup(updates, preset=presets.Precise, **overrides):
+    return assembly.setup(settings(updates, preset, **overrides))
+
+
+def test_a_short_training_improves_the_return():
+    setup = small_attitude_setup(120, presets.PaperFast, num_envs=128, rollout_length=64,
+                                 reward_scale=0.01, minibatch_size=512)  # fmt: skip
+    env_params = tuple(env.default_params for env in setup.envs)
+    state = learner.init(setup, env_params, jax.random.key(0))
+    returns = []
+    for _ in range(4):
+        state, metrics = ppo.train_block(setup, env_params, state, 30)
+        sums = metrics["episodes"]
+        mean = sums["score"] / sums["episodes"]
+        error = jnp.sqrt((sums["score_squared"] / sums["episodes"] - mean**2) / sums["episodes"])
+        returns.append((float(mean[0]), float(error[0])))
+    (first, first_error), (last, last_error) = returns[0], returns[-1]
+    assert last - first > 5 * np.hypot(first_error, last_error)
+
+
+def test_one_compilation_serves_blocks_of_any_length():
+    setup = small_attitude_setup(10)
+    env_params = tuple(env.default_params for env in setup.envs)
+    state = learner.init(setup, env_params, jax.random.key(0))
+    before = ppo.train_block._cache_size()
+    for length in (1, 2, 3):
+        state, _ = ppo.train_block(setup, env_params, state, length)
+    assert ppo.train_block._cache_size() == before + 1
+    assert state.update == 6
+
+
+def test_blocks_of_any_length_give_the_same_bits():
+    setup = small_attitude_setup(4)
+    env_params = tuple(env.default_params for env in setup.envs)
+    results = []
+    for lengths in ((4,), (1, 3)):
+        state = learner.init(setup, env_params, jax.random.key(7))
+        for length in lengths:
+            state, _ = ppo.train_block(setup, env_params, state, length)
+        results.append(jax.tree.map(np.asarray, state.params))
+    jax.tree.map(np.testing.assert_array_equal, *results)
+
+
+def test_learning_rate_anneals_over_the_whole_run():
+    """Adam's first step moves each parameter by the learning rate; the last by the final one."""
+    chosen = settings(3, passes=2, learning_rate=1e-2, final_learning_rate=1e-4)
+    assert (chosen.num_updates, chosen.minibatches) == (3, 8)
+    transformation = learner.optimizer(chosen)
+    gradient = jnp.ones(())
+    state = transformation.init(gradient)
+    moves = []
+    for _ in range(3 * 2 * 8 + 1):
+        move, state = transformation.update(gradient, state)
+        moves.append(-float(move))
+    np.testing.assert_allclose(moves, np.linspace(1e-2, 1e-4, 49), rtol=1e-3)
+
+
+def test_spacecraft_are_shared_out_among_the_control_rates():
+    setup = small_attitude_setup(1, num_envs=64)
+    sizes = [group.stop - group.start for group in setup.slices]
+    assert sum(sizes) == 64 and set(sizes) == {12, 13}
+    assert [env.frameskip for env in setup.envs] == [5, 7, 10, 14, 20]
+    env_params = tuple(env.default_params for env in setup.envs)
+    contexts = [env.context(p) for env, p in zip(setup.envs, env_params)]
+    discounts = ppo.discounts(setup, contexts)
+    for env, group in zip(setup.envs, setup.slices):
+        expected = 0.995 ** (env.control_period / 0.025)
+        np.testing.assert_allclose(discounts[group], expected, rtol=1e-6)
+        features = setup.policy.encode(jnp.zeros(11), env.context(env.default_params)).features
+        assert float(features[37]) == pytest.approx(10 * env.control_period)
+
+
+def test_staggered_episodes_start_at_random_times():
+    staggered = small_attitude_setup(1)
+    env_params = tuple(env.default_params for env in staggered.envs)
+    times = learner.init(staggered, env_params, jax.random.key(0)).env_states[0].time
+    assert len(set(times.tolist())) > 5 and int(times.max()) < 1750
+    together = dataclasses.replace(
+        staggered, settings=dataclasses.replace(staggered.settings, stagger_episodes=False)
+    )
+    assert not learner.init(together, env_params, jax.random.key(0)).env_states[0].time.any()
+
+
+@pytest.mark.parametrize("spoiled", ["observations", "parameters"])
+def test_divergence_names_its_first_update(spoiled):
+    setup = small_attitude_setup(4)
+    env_params = tuple(env.default_params for env in setup.envs)
+    state = learner.init(setup, env_params, jax.random.key(0))
+    if spoiled == "observations":
+        states = state.env_states
+        broken = states[0].replace(quaternion=states[0].quaternion.at[0].set(jnp.nan))
+        state = state.replace(
+            env_states=(broken, *states[1:]), observation=state.observation.at[0].set(jnp.nan)
+        )
+    else:
+        params = jax.tree.map(lambda x: x.at[0].set(jnp.inf), state.params)
+        state = state.replace(params=params)
+    _, metrics = ppo.train_block(setup, env_params, state, 2)
+    assert metrics["diverged"][spoiled] == 0
+
+
+def test_healthy_runs_do_not_diverge():
+    _, metrics = train(small_attitude_setup(2))
+    assert {int(update) for update in metrics["diverged"].values()} == {-1}
