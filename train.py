@@ -12,6 +12,7 @@ import time
 
 from attjax import cli, presets
 
+DEFAULT_PRESET = "precise"
 DIVERGED = 3
 SAVE_EVERY_S = 30.0
 
@@ -19,7 +20,7 @@ SAVE_EVERY_S = 30.0
 def parse_arguments(argv):
     parser = cli.Parser(prog="train.py", description=__doc__)
     parser.add_argument(
-        "--preset", choices=presets.PRESETS, default="precise", help="the recipe (default: precise)"
+        "--preset", choices=presets.PRESETS, help=f"the recipe (default: {DEFAULT_PRESET})"
     )
     cli.add_common(parser, seed_help="of everything random (default: 0)")
     existing = parser.add_mutually_exclusive_group()
@@ -34,7 +35,8 @@ def main(argv=None) -> int:
     """Run a training; returns the exit status."""
     arguments = parse_arguments(argv)
     with cli.one_line_errors("train.py", ValueError):
-        new = presets.PRESETS[arguments.preset](**cli.overrides(arguments))
+        preset = arguments.preset or DEFAULT_PRESET
+        new = dataclasses.replace(presets.PRESETS[preset], **cli.overrides(arguments))
     with cli.one_line_errors("train.py"):
         device = cli.select_device(arguments.device)
 
@@ -47,7 +49,7 @@ def main(argv=None) -> int:
             config = _resumed_config(arguments, checkpoint.read_config(folder))
             checkpoint.write_config(folder, config)
         else:
-            config = checkpoint.Config(arguments.preset, arguments.seed or 0, new)
+            config = checkpoint.Config(preset, arguments.seed or 0, new)
             checkpoint.create(folder, config, arguments.overwrite)
     return Run(folder, config, device).train()
 
@@ -56,9 +58,10 @@ def _resumed_config(arguments, config):
     """The folder's run, with a larger total if one was asked for."""
     given = cli.overrides(arguments)
     total = given.pop("total_steps", config.settings.total_steps)
-    if arguments.seed is not None:
-        given["seed"] = arguments.seed
-    run = dataclasses.asdict(config.settings) | {"seed": config.seed}
+    for name in ("preset", "seed"):
+        if getattr(arguments, name) is not None:
+            given[name] = getattr(arguments, name)
+    run = vars(config) | dataclasses.asdict(config.settings)
     differing = [name for name, value in given.items() if run[name] != value]
     if differing:
         listed = ", ".join(f"{name} ({run[name]})" for name in differing)
@@ -136,13 +139,9 @@ class Run:
         while self.update < self.settings.num_updates and self.stopped_by is None:
             count = min(self.settings.updates_per_block, self.settings.num_updates - self.update)
             self.learner, metrics = train_block(self.env_params, self.learner, count)
-            for name, update in metrics["diverged"].items():
-                if update >= 0:
-                    steps = (int(update) + 1) * self.settings.steps_per_update
-                    return (
-                        f"{name} were not finite at agent step {steps:,} (update {int(update)}); "
-                        f"{self.folder} keeps the last good checkpoint"
-                    )
+            diverged = {name: int(update) for name, update in metrics["diverged"].items()}
+            if max(diverged.values()) >= 0:
+                return self._divergence(diverged)
             self.update += count
             row = progress.metrics_row(metrics, self.agent_steps, time.monotonic() - start)
             self.metrics_file.append(row)
@@ -151,6 +150,16 @@ class Run:
                 saver.save(self.learner)
                 saved = time.monotonic()
         return None
+
+    def _divergence(self, diverged):
+        """One line that names the first update with something not finite, and what it was."""
+        first = min(update for update in diverged.values() if update >= 0)
+        names = ", ".join(name for name, update in diverged.items() if update == first)
+        steps = (first + 1) * self.settings.steps_per_update
+        return (
+            f"not finite at agent step {steps:,} (update {first}): {names}; "
+            f"{self.folder} keeps the last good checkpoint"
+        )
 
     def _finish(self):
         if self.stopped_by is not None:

@@ -75,7 +75,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     for field in dataclasses.fields(settings.Settings):
         flag = "--" + field.name.replace("_", "-")
         defaults = ", ".join(
-            f"{name} {_show(getattr(preset(), field.name))}"
+            f"{name} {_show(getattr(preset, field.name))}"
             for name, preset in presets.PRESETS.items()
         )
         options = {"default": argparse.SUPPRESS, "help": f"{field.metadata['help']} ({defaults})"}

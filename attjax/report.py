@@ -18,7 +18,7 @@ PAPER_TABLE_2 = {
 }  # fmt: skip
 """Table 2 of the paper, in the order of STATISTICS; angles in degrees, rates in rad/s."""
 
-TABLE_WIDTH = 96
+TABLE_WIDTH = 100
 ROW_NAMES = ("Mean", "Std. dev.", "Min", "Q1", "Q2", "Q3", "Max")
 SYMBOLS = {"error_deg": "φ (°)", "rate_rad_s": "‖ω‖ (rad/s)"}
 
@@ -33,12 +33,13 @@ def print_report(result: dict) -> None:
         f"seed {result['seed']}\n"
     )
     console.print(_table_2(result))
+    console.print()
     for name, value in _summary(result):
         console.print(f"{name:<18}{value}")
 
 
 def _table_2(result):
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
     table.add_column("\n", no_wrap=True)
     for state, quantity in PAPER_TABLE_2:
         title = f"{state.capitalize()}\n{SYMBOLS[quantity]}"

@@ -26,7 +26,8 @@ class ProbeParams:
 class Probe:
     """An episode of ``length`` steps, ended by the time limit or by termination.
 
-    The observation is (sign, step / length), or (sign, 0) where time is not shown. ``reward`` is one of:
+    The observation is (sign, step / length), or (sign, 0) where time is not shown.
+    ``reward`` is one of:
     "constant", 1 each step; "sign", the observed sign; "last", 1 at the last step;
     "match", 1 where action 1 meets sign +1 or action 0 meets sign −1, else 0.
     """

@@ -1,0 +1,150 @@
+import dataclasses
+import json
+import shutil
+
+import jax
+import numpy as np
+import pytest
+
+from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, presets
+from attjax.checkpoint import CheckpointError, Config
+
+SETTINGS = dataclasses.replace(
+    presets.PRECISE,
+    frameskips=(5, 20),
+    num_envs=8,
+    rollout_length=4,
+    minibatch_size=8,
+    hidden_sizes=(8,),
+    total_steps=8 * 4 * 4,
+)
+CONFIG = Config("precise", 3, SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """A run folder with one checkpoint, and the learner saved in it."""
+    folder = tmp_path_factory.mktemp("run")
+    checkpoint.create(folder, CONFIG, overwrite=False)
+    setup = assembly.setup(SETTINGS)
+    env_params = tuple(env.default_params for env in setup.envs)
+    state = learner.init(setup, env_params, jax.random.key(3))
+    state, _ = ppo.train_block(setup, env_params, state, 2)
+    with checkpoint.Saver(folder) as saver:
+        saver.save(state)
+        saver.save(state)  # the same update again: left as it is
+    return folder, setup, env_params, state
+
+
+def copy(learner_state):
+    """The block donates its argument."""
+    return jax.tree.map(lambda x: x.copy(), learner_state)
+
+
+def test_config_round_trip(trained):
+    assert checkpoint.read_config(trained[0]) == CONFIG
+
+
+def test_restored_learner_is_the_saved_one_and_goes_on_bitwise(trained):
+    folder, setup, env_params, state = trained
+    assert checkpoint.latest(folder) == 2
+    template = learner.init(setup, env_params, jax.random.key(99))
+    restored = checkpoint.restore_learner(folder, template)
+    on_from_memory, _ = ppo.train_block(setup, env_params, copy(state), 2)
+    on_from_disk, _ = ppo.train_block(setup, env_params, restored, 2)
+    assert on_from_disk.update == 4
+    for a, b in zip(jax.tree.leaves(on_from_memory), jax.tree.leaves(on_from_disk)):
+        if jax.dtypes.issubdtype(a.dtype, jax.dtypes.prng_key):
+            a, b = map(jax.random.key_data, (a, b))
+        np.testing.assert_array_equal(a, b)
+
+
+def observe_some(env, n=50):
+    keys = jax.random.split(jax.random.key(0), n)
+    return jax.vmap(env.reset, (0, None))(keys, env.default_params)[0]
+
+
+def test_restored_policy_acts_as_the_saved_one(trained):
+    folder, setup, _, state = trained
+    act = checkpoint.restore_policy(folder)
+    env = AttitudeEnv(20)
+    context = env.context(env.default_params)
+    for observation in observe_some(env):
+        assert act(observation, context) == setup.policy.act(state.params, observation, context)
+
+
+def test_float32_policy_serves_a_float64_simulation(trained, x64):
+    act = checkpoint.restore_policy(trained[0])
+    env = AttitudeEnv(20)
+    observation = observe_some(env, 1)[0]
+    assert observation.dtype == np.float64
+    assert 0 <= int(act(observation, env.context(env.default_params))) < 19
+
+
+def test_a_run_is_not_overwritten_unless_asked(trained):
+    folder = trained[0]
+    before = sorted(p.name for p in folder.rglob("*"))
+    with pytest.raises(CheckpointError, match=r"--resume .* --overwrite"):
+        checkpoint.create(folder, CONFIG, overwrite=False)
+    assert sorted(p.name for p in folder.rglob("*")) == before
+
+
+def test_overwrite_removes_the_run_and_nothing_else(tmp_path):
+    checkpoint.create(tmp_path, CONFIG, overwrite=False)
+    (tmp_path / "7").mkdir()
+    (tmp_path / "metrics.csv").write_text("x")
+    checkpoint.create(tmp_path, CONFIG, overwrite=True)
+    assert [p.name for p in tmp_path.iterdir()] == ["config.json"]
+
+
+def test_folders_with_other_files_are_refused_and_kept(tmp_path):
+    (tmp_path / "thesis.tex").write_text("precious")
+    for overwrite in (False, True):
+        with pytest.raises(CheckpointError, match="not empty"):
+            checkpoint.create(tmp_path, CONFIG, overwrite)
+    assert (tmp_path / "thesis.tex").read_text() == "precious"
+
+
+def edited(tmp_path, **changes):
+    checkpoint.create(tmp_path, CONFIG, overwrite=False)
+    path = tmp_path / "config.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        ({"program": "other"}, "another program"),
+        ({"format": 2}, "format 2"),
+        ({"settings": {}}, "unknown or missing"),
+        ({"seed": None}, "cannot be read"),
+    ],
+)
+def test_foreign_configurations_are_refused(tmp_path, changes, message):
+    with pytest.raises(CheckpointError, match=message):
+        checkpoint.read_config(edited(tmp_path, **changes))
+
+
+def test_missing_empty_and_truncated_folders_are_refused(tmp_path, trained):
+    with pytest.raises(CheckpointError, match="no checkpoint folder"):
+        checkpoint.restore_policy(tmp_path / "nowhere")
+    with pytest.raises(CheckpointError, match=r"no config\.json"):
+        checkpoint.restore_policy(tmp_path)
+    checkpoint.create(tmp_path, CONFIG, overwrite=False)
+    with pytest.raises(CheckpointError, match="no checkpoint yet"):
+        checkpoint.restore_policy(tmp_path)
+    (tmp_path / "config.json").write_text("{")
+    with pytest.raises(CheckpointError, match="cannot be read"):
+        checkpoint.restore_policy(tmp_path)
+
+
+def test_damaged_checkpoints_are_refused_in_one_line(trained, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(trained[0], folder)
+    for path in (folder / "2" / "policy").rglob("*"):
+        if path.is_file():
+            path.write_bytes(b"")
+    with pytest.raises(CheckpointError, match="cannot be read") as error:
+        checkpoint.restore_policy(folder)
+    assert "\n" not in str(error.value)

@@ -1,0 +1,55 @@
+"""One-way imports, as in README.md: a module knows only those of earlier layers."""
+
+import ast
+from pathlib import Path
+
+import attjax
+
+LAYERS = [
+    {"settings", "quaternion", "context", "spaces"},
+    {"dynamics"},
+    {"spacecraft", "reward", "observation"},
+    {"env"},
+    {"networks", "losses"},
+    {"learner", "evaluation"},
+    {"rollout"},
+    {"ppo"},
+    {"presets", "assembly"},
+    {"checkpoint", "progress", "report", "cli"},
+]
+LEARNING = {"networks", "losses", "learner", "rollout", "ppo"}
+SPACECRAFT = {"spacecraft", "reward", "env"}
+FOLDER = Path(attjax.__file__).parent
+
+
+def imports(module):
+    """The attjax modules that a module imports, at its top or inside functions."""
+    found = set()
+    for node in ast.walk(ast.parse((FOLDER / f"{module}.py").read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module == "attjax":
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("attjax."):
+            found.add(node.module.split(".")[1])
+        elif isinstance(node, ast.Import):
+            found |= {a.name.split(".")[1] for a in node.names if a.name.startswith("attjax.")}
+    return found
+
+
+def test_every_module_has_its_layer():
+    modules = {path.stem for path in FOLDER.glob("*.py")} - {"__init__"}
+    assert modules == set().union(*LAYERS)
+
+
+def test_modules_import_only_earlier_layers():
+    earlier = set()
+    for layer in LAYERS:
+        for module in layer:
+            assert imports(module) <= earlier, module
+        earlier |= layer
+
+
+def test_learning_never_hears_of_spacecraft_and_physics_never_of_learning():
+    for module in LEARNING:
+        assert not imports(module) & SPACECRAFT, module
+    for module in SPACECRAFT | {"quaternion", "dynamics", "observation"}:
+        assert not imports(module) & LEARNING, module

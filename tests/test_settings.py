@@ -1,0 +1,67 @@
+import dataclasses
+import json
+
+import pytest
+
+from attjax import settings
+from attjax.presets import PAPER, PAPER_FAST, PRECISE, PRESETS
+
+
+def test_paper_presets_hold_what_the_paper_names():
+    """Tables 3 and 4, section 2.5."""
+    for preset in (PAPER, PAPER_FAST):
+        assert preset.hidden_sizes == (400, 300)
+        assert (preset.discount, preset.discount_period) == (0.99, 0)
+        assert (preset.learning_rate, preset.final_learning_rate) == (3e-4, 1e-5)
+        assert (preset.clip, preset.entropy_coefficient) == (0.2, 1e-4)
+        assert (preset.frameskips, preset.reward, preset.features) == ((20,), "paper", "state")
+        assert preset.time_limit_terminates and preset.rate_margin == 0
+    assert (PAPER.num_envs, PAPER.rollout_length, PAPER.minibatch_size) == (30, 500, 128)
+    assert PAPER.num_updates == 4340 and PAPER.gae_lambda == 1
+
+
+@pytest.mark.parametrize("preset", PRESETS.values())
+def test_settings_survive_json(preset):
+    chosen = dataclasses.replace(preset, num_envs=64, total_steps=123)
+    restored = settings.from_json(json.loads(json.dumps(dataclasses.asdict(chosen))))
+    assert restored == chosen
+
+
+def test_total_steps_round_up_to_whole_updates():
+    chosen = dataclasses.replace(
+        PRECISE, num_envs=10, rollout_length=10, minibatch_size=10, total_steps=101
+    )
+    assert chosen.num_updates == 2 and chosen.minibatches == 10
+
+
+@pytest.mark.parametrize(
+    "name, value, allowed",
+    [
+        ("num_envs", 0, "an integer at least 1"),
+        ("num_envs", 2.5, "an integer"),
+        ("num_envs", True, "an integer"),
+        ("num_envs", 4, "at least 5, the number of frameskips"),
+        ("frameskips", (), "integers at least 0 and below 10500"),
+        ("frameskips", (5, -1), "integers at least 0"),
+        ("frameskips", 5, "integers at least 0"),
+        ("discount", 0.0, "a number above 0 and at most 1"),
+        ("discount", float("nan"), "a number"),
+        ("clip", 1.0, "below 1"),
+        ("reward", "sparse", "one of paper, logarithmic"),
+        ("normalize_advantage", "yes", "true or false"),
+        ("minibatch_size", 10**9, "at most num_envs x rollout_length"),
+    ],
+)
+def test_bad_values_are_refused_with_what_is_allowed(name, value, allowed):
+    with pytest.raises(ValueError) as error:
+        dataclasses.replace(PRECISE, **{name: value})
+    assert str(error.value).startswith(name) and allowed in str(error.value)
+
+
+def test_unknown_and_missing_names_are_refused():
+    values = dataclasses.asdict(PRECISE)
+    with pytest.raises(ValueError, match="gravity"):
+        settings.from_json(values | {"gravity": 1})
+    del values["clip"]
+    with pytest.raises(ValueError, match="clip"):
+        settings.from_json(values)
