@@ -113,10 +113,17 @@ class Run:
 
     def train(self) -> int:
         """Train to the end, or to a signal; returns the exit status."""
+        signals = (signal.SIGINT, signal.SIGTERM)
+        previous = {number: signal.signal(number, self._stop) for number in signals}
+        try:
+            return self._train()
+        finally:
+            for number, handler in previous.items():
+                signal.signal(number, handler)
+
+    def _train(self):
         from attjax import checkpoint, ppo, progress
 
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._stop)
         start = time.monotonic()
         lowered = ppo.train_block.lower(self.setup, self.env_params, self.learner, 1)
         train_block = lowered.compile()

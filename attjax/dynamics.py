@@ -89,7 +89,8 @@ def rate_after_impulse(angular_velocity, torque, inertia):
     """
     if inertia.ndim == 1:
         return angular_velocity + torque / inertia * INTEGRATION_STEP
-    return angular_velocity + torque @ _inverse(inertia) * INTEGRATION_STEP
+    acceleration = jnp.matmul(torque, _inverse(inertia), precision="highest")
+    return angular_velocity + acceleration * INTEGRATION_STEP
 
 
 def _checked(quaternion, angular_velocity, torque, inertia):
@@ -110,7 +111,7 @@ def _inverse(inertia):
     """Inverse of a symmetric 3x3 matrix, by the cross products of its rows."""
     a, b, c = inertia
     adjugate = jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
-    return adjugate / (a @ adjugate[0])
+    return adjugate / jnp.sum(a * adjugate[0])
 
 
 def _apply(matrix, vector):
