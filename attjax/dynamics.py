@@ -44,7 +44,8 @@ def rk4_step(quaternion, angular_velocity, torque, inertia, dt=INTEGRATION_STEP)
         quaternion, angular_velocity, torque, inertia
     )
     state = (*quaternion, *angular_velocity)
-    state = _rk4(state, tuple(torque), _inertia_components(inertia), dt)
+    increment = _rk4_increment(state, tuple(torque), _inertia_components(inertia), dt)
+    state = _add(state, increment)
     return jnp.stack(state[:4]), jnp.stack(state[4:])
 
 
@@ -52,7 +53,8 @@ def propagate(quaternion, angular_velocity, torque, inertia, frameskip):
     """One agent step: an RK4 step with the torque on, then ``frameskip`` torque-free ones.
 
     Eq. 9 is linear in q, so the one normalisation at the end equals the paper's
-    normalisation after each RK4 step, up to rounding.
+    normalisation after each RK4 step, up to rounding. The change is summed up apart from the
+    state: float32 would lose a slow turn's small increments if each were added to the state.
 
     Args:
         quaternion, angular_velocity, torque, inertia: as in :func:`rk4_step`.
@@ -67,12 +69,15 @@ def propagate(quaternion, angular_velocity, torque, inertia, frameskip):
     inertia = _inertia_components(inertia)
     no_torque = (jnp.zeros_like(torque[0]),) * 3
 
-    def free_step(state, _):
-        return _rk4(state, no_torque, inertia, INTEGRATION_STEP), None
+    start = (*quaternion, *angular_velocity)
 
-    state = (*quaternion, *angular_velocity)
-    state = _rk4(state, tuple(torque), inertia, INTEGRATION_STEP)
-    state, _ = jax.lax.scan(free_step, state, length=frameskip)
+    def free_step(change, _):
+        increment = _rk4_increment(_add(start, change), no_torque, inertia, INTEGRATION_STEP)
+        return _add(change, increment), None
+
+    change = _rk4_increment(start, tuple(torque), inertia, INTEGRATION_STEP)
+    change, _ = jax.lax.scan(free_step, change, length=frameskip)
+    state = _add(start, change)
     return quaternions.normalize(jnp.stack(state[:4])), jnp.stack(state[4:])
 
 
@@ -132,7 +137,11 @@ def _angular_acceleration(angular_velocity, torque, inertia):
     )
 
 
-def _rk4(state, torque, inertia, dt):
+def _add(state, change):
+    return tuple(x + dx for x, dx in zip(state, change))
+
+
+def _rk4_increment(state, torque, inertia, dt):
     def rate(state):
         quaternion, angular_velocity = state[:4], state[4:]
         return (
@@ -147,4 +156,4 @@ def _rk4(state, torque, inertia, dt):
     k2 = rate(advance(dt / 2, k1))
     k3 = rate(advance(dt / 2, k2))
     k4 = rate(advance(dt, k3))
-    return advance(dt / 6, tuple(a + 2 * (b + c) + d for a, b, c, d in zip(k1, k2, k3, k4)))
+    return tuple(dt / 6 * (a + 2 * (b + c) + d) for a, b, c, d in zip(k1, k2, k3, k4))

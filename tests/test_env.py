@@ -158,3 +158,48 @@ def test_environments_are_hashable_static_arguments():
 def test_bad_frameskips_are_refused(frameskip):
     with pytest.raises(ValueError, match=r"frameskip is .* from 0 to 10499"):
         AttitudeEnv(frameskip=frameskip)
+
+
+def scores_and_improvement(dtype, quaternion, angular_velocity, action):
+    """Eq. 12-13 of one step from each state, and the relative change of sin²(φ/2)."""
+    env = AttitudeEnv(frameskip=20)
+    params = env.default_params
+
+    def one(q, w, a):
+        state = EnvState(q, w, jnp.zeros((), jnp.int32))
+        _, after, reward, terminated, _ = env.step_env(None, state, a, params)
+        before, later = (jnp.sum(x[:3] ** 2) / jnp.sum(x**2) for x in (q, after.quaternion))
+        return reward, terminated, (later - before) / before, after.quaternion
+
+    arrays = (jnp.array(quaternion, dtype), jnp.array(angular_velocity, dtype), jnp.array(action))
+    return [np.asarray(x) for x in jax.jit(jax.vmap(one))(*arrays)]
+
+
+def test_float32_takes_the_same_reward_branches_as_float64():
+    """Step by step from the same states, from 1e-7 rad to 150°; only ties may differ."""
+    rng = np.random.default_rng(0)
+    n = 100_000
+    axis, spin = rng.normal(size=(2, n, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    half = 10 ** rng.uniform(-7, np.log10(np.deg2rad(75)), (n, 1))
+    quaternion = np.hstack([axis * np.sin(half), np.cos(half)]).astype(np.float32)
+    rate = 10 ** rng.uniform(-7, np.log10(0.6), (n, 1))
+    angular_velocity = (spin / np.linalg.norm(spin, axis=1, keepdims=True) * rate).astype("f4")
+    action = rng.integers(0, 19, n)
+    single, ended, _, _ = scores_and_improvement(jnp.float32, quaternion, angular_velocity, action)
+    with jax.enable_x64(True):
+        double, ended_double, change, after = scores_and_improvement(
+            jnp.float64, quaternion, angular_velocity, action
+        )
+    angle = 2 * np.arctan2(np.linalg.norm(after[:, :3], axis=1), after[:, 3])
+    differ = np.abs(single - double) > 1e-4
+    tied = np.abs(change) < 1e-6
+    tied |= np.abs(angle / np.deg2rad(0.25) - 1) < 1e-6
+    assert not np.any(differ & ~tied)
+    assert np.mean(differ) < 1e-3 and np.mean(tied) < 0.02
+    assert np.mean(ended == ended_double) > 0.9999 and 0.01 < ended.mean() < 0.5
+    # every branch was visited
+    assert {-50.0} < set(np.round(double[ended_double]))
+    assert (
+        min((double > 9).mean(), (double < 0).mean(), ((double > 0) & (double < 1)).mean()) > 0.02
+    )
