@@ -3,6 +3,8 @@
 Example:
     python eval.py --checkpoint ckpt/
     python eval.py --checkpoint ckpt/ --frameskip 20 --json result.json
+    python eval.py --controller phase-plane
+    python eval.py --checkpoint ckpt/ --compare
 """
 
 import json
@@ -12,10 +14,20 @@ from pathlib import Path
 
 from attjax import cli
 
+POLICY = "policy"
+CLASSICAL = ("phase-plane", "feedback")
+
 
 def parse_arguments(argv):
     parser = cli.Parser(prog="eval.py", description=__doc__)
     cli.add_common(parser, seed_help="of the initial slews (default: 0)")
+    who = parser.add_mutually_exclusive_group()
+    controller_help = "the trained policy (default), or a classical controller, without checkpoint"
+    who.add_argument(
+        "--controller", choices=(POLICY, *CLASSICAL), default=POLICY, help=controller_help
+    )
+    compare_help = "policy, classical controllers and the paper side by side, on the same slews"
+    who.add_argument("--compare", action="store_true", help=compare_help)
     cli.add_number(parser, "episodes", int, 5000, "number of slews", low=1, high=10**7)
     frameskip_help = "torque-free RK4 steps after an impulse; the control rate is 240/(N + 1) Hz"
     cli.add_number(parser, "frameskip", int, 5, frameskip_help, low=0, below=10_500)
@@ -25,7 +37,7 @@ def parse_arguments(argv):
 
 
 def main(argv=None) -> int:
-    """Evaluate a checkpoint; returns the exit status."""
+    """Evaluate a checkpoint or a classical controller; returns the exit status."""
     arguments = parse_arguments(argv)
     with cli.one_line_errors("eval.py"):
         cli.select_device(arguments.device)
@@ -36,20 +48,38 @@ def main(argv=None) -> int:
 
     from attjax import AttitudeEnv, checkpoint, evaluation, report
 
+    names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
     with cli.one_line_errors("eval.py", checkpoint.CheckpointError):
-        controller = checkpoint.restore_policy(arguments.checkpoint)
+        controllers = {name: _controller(name, arguments.checkpoint) for name in names}
         _check_writable(arguments.json)
     env = AttitudeEnv(arguments.frameskip)
     params = env.default_params.replace(max_steps_in_episode=jnp.array(steps, jnp.int32))
     start = time.monotonic()
-    result = {"controller": "policy"} | evaluation.evaluate(
-        controller, env, params, arguments.seed or 0, arguments.episodes
-    )
-    report.print_report(result)
+    seed = arguments.seed or 0
+    results = [
+        {"controller": name}
+        | evaluation.evaluate(controller, env, params, seed, arguments.episodes)
+        for name, controller in controllers.items()
+    ]
+    if arguments.compare:
+        report.print_comparison(results)
+    else:
+        report.print_report(results[0])
     print(f"evaluated in {time.monotonic() - start:.1f} s, compilation included")
     if arguments.json:
-        arguments.json.write_text(json.dumps(result, indent=2) + "\n")
+        content = {"controllers": results} if arguments.compare else results[0]
+        arguments.json.write_text(json.dumps(content, indent=2) + "\n")
     return 0
+
+
+def _controller(name, folder):
+    import jax
+
+    from attjax import checkpoint, controllers
+
+    if name == POLICY:
+        return checkpoint.restore_policy(folder)
+    return jax.tree_util.Partial(controllers.CONTROLLERS[name])
 
 
 def _episode_steps(duration, frameskip):

@@ -98,6 +98,13 @@ def rate_after_impulse(angular_velocity, torque, inertia):
     return angular_velocity + acceleration * INTEGRATION_STEP
 
 
+def angular_momentum(inertia, angular_velocity):
+    """I ω, N m s, for an inertia (3,) or (3, 3) and a (3,) angular velocity."""
+    if inertia.ndim == 1:
+        return inertia * angular_velocity
+    return jnp.sum(inertia * angular_velocity, axis=-1)
+
+
 def _checked(quaternion, angular_velocity, torque, inertia):
     arrays = [jnp.asarray(x) for x in (quaternion, angular_velocity, torque, inertia)]
     chex.assert_shape(arrays, [(4,), (3,), (3,), {1: (3,)}.get(arrays[3].ndim, (3, 3))])

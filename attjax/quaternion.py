@@ -55,6 +55,23 @@ def derivative(quaternion, angular_velocity):
     )
 
 
+def rotation_vector(quaternion: chex.Array) -> chex.Array:
+    """Shortest rotation as axis times angle, (3,), rad, of a (4,) quaternion.
+
+    Example:
+        >>> q = from_axis_angle(jnp.array([0.0, 1.0, 0.0]), 1.5 * jnp.pi)
+        >>> round(rotation_vector(q)[1].item() / jnp.pi, 6)
+        -0.5
+    """
+    quaternion = jnp.asarray(quaternion)
+    chex.assert_shape(quaternion, (4,))
+    sine = jnp.sqrt(jnp.sum(quaternion[:3] ** 2))
+    half_angle = jnp.arctan2(sine, jnp.abs(quaternion[3]))
+    tiny = jnp.finfo(quaternion.dtype).tiny
+    scale = jnp.where(sine > tiny, 2 * half_angle / jnp.maximum(sine, tiny), 2.0)
+    return jnp.where(quaternion[3] < 0, -scale, scale) * quaternion[:3]
+
+
 def error_angle(quaternion: chex.Array) -> chex.Array:
     """Rotation angle φ ∈ [0, 2π], rad, of a (4,) quaternion of any length.
 

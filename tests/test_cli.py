@@ -12,7 +12,7 @@ import jax
 import numpy as np
 import pytest
 
-from attjax import checkpoint, evaluation, learner
+from attjax import checkpoint, controllers, evaluation, learner
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
@@ -81,6 +81,32 @@ def test_evaluation_prints_table_2_and_writes_json(trained, tmp_path):
         assert set(content[state]) == {"error_deg", "rate_rad_s"}
         assert set(content[state]["error_deg"]) == set(evaluation.STATISTICS)
     assert set(content["settling_time_s"]) == {*evaluation.STATISTICS, "never"}
+
+
+def test_classical_controllers_need_no_checkpoint(tmp_path):
+    path = tmp_path / "result.json"
+    result = run(
+        "eval.py", "--controller", "phase-plane", "--episodes", 20, "--json", path,
+        "--device", "cpu", cwd=tmp_path,
+    )  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    content = json.loads(path.read_text())
+    assert content["controller"] == "phase-plane" and content["success_rate"] == 1
+
+
+def test_comparison_flies_the_same_slews(trained, tmp_path):
+    path = tmp_path / "result.json"
+    result = run(
+        "eval.py", "--checkpoint", trained[0], "--compare", "--episodes", 10, "--duration", 5,
+        "--json", path, "--device", "cpu",
+    )  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    header = next(line for line in result.stdout.splitlines() if "paper" in line)
+    assert header.split() == ["policy", "phase-plane", "feedback", "paper"]
+    results = json.loads(path.read_text())["controllers"]
+    assert [r["controller"] for r in results] == ["policy", *eval_script.CLASSICAL]
+    assert set(controllers.CONTROLLERS) == set(eval_script.CLASSICAL)
+    assert len({(r["seed"], r["episodes"], r["duration_s"]) for r in results}) == 1
 
 
 def test_a_stopped_run_goes_on_to_the_same_bits(trained, tmp_path):

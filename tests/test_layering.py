@@ -10,6 +10,7 @@ LAYERS = [
     {"dynamics"},
     {"spacecraft", "reward", "observation"},
     {"env"},
+    {"controllers"},
     {"networks", "losses"},
     {"learner", "evaluation"},
     {"rollout"},

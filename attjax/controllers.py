@@ -1,0 +1,83 @@
+"""Classical controllers on the same discrete torques, with the signature of a policy.
+
+``act(observation (11,), context) -> action``. Both ask for an angular velocity and take the
+action whose impulse comes nearest to the one that leads there.
+"""
+
+import chex
+import jax.numpy as jnp
+
+from attjax import dynamics
+from attjax import observation as observations
+from attjax import quaternion as quaternions
+from attjax.context import Context
+
+BRAKING_MARGIN = 0.75
+"""Share of the available deceleration that the braking curve counts on."""
+
+TERMINAL_GAIN = 0.5
+"""Share of the remaining angle that the phase-plane controller covers in a control period."""
+
+FEEDBACK_BANDWIDTH = 1.8
+"""Bandwidth of the quaternion feedback, in units of the slowest braking rate (see there)."""
+
+RATE_MARGIN = 0.9
+"""Largest wanted rate, as a share of the rate limit."""
+
+
+def phase_plane(observation: chex.Array, context: Context) -> chex.Array:
+    """Follow the braking curve along the rotation to the goal.
+
+    With the impulses shared among the axes so that all arrive together, the angle |θ| that
+    remains can be braked from the rate ω = −θ √(2 η U / Σ|I θ|), where U is the largest
+    torque averaged over a control period and η the braking margin. Close to the goal the
+    rate is limited to a share of θ in each period.
+
+    Args:
+        observation: (11,) Eq. 11.
+        context: the spacecraft and its actions.
+
+    Returns:
+        The action, an integer scalar.
+    """
+    angle = quaternions.rotation_vector(observation[observations.QUATERNION])
+    momentum = jnp.sum(jnp.abs(dynamics.angular_momentum(context.inertia, angle)))
+    braking = jnp.sqrt(2 * BRAKING_MARGIN * average_torque(context) / jnp.maximum(momentum, 1e-12))
+    gain = jnp.minimum(braking, TERMINAL_GAIN / context.control_period)
+    return nearest_action(-gain * angle, observation, context)
+
+
+def quaternion_feedback(observation: chex.Array, context: Context) -> chex.Array:
+    """Quaternion-rate feedback (PD): M = −I (2 λ q_v sign(q_s) + ω) / Δt.
+
+    The derivative gain, one over the control period Δt, takes the rate error out in one
+    period; the proportional gain is 2 λ/Δt with the bandwidth λ a fixed multiple of
+    √(U / (π I_max)), the braking rate of a half turn about the largest inertia.
+    """
+    quaternion = observation[observations.QUATERNION]
+    sign = jnp.where(quaternion[3] < 0, -1.0, 1.0).astype(quaternion.dtype)
+    largest = jnp.max(context.inertia)
+    bandwidth = FEEDBACK_BANDWIDTH * jnp.sqrt(average_torque(context) / (jnp.pi * largest))
+    return nearest_action(-2 * bandwidth * sign * quaternion[:3], observation, context)
+
+
+def average_torque(context: Context) -> chex.Array:
+    """Largest torque, averaged over a control period, N m: it acts for one RK4 step of it."""
+    largest = jnp.max(jnp.sqrt(jnp.sum(context.torque_table**2, axis=-1)))
+    return largest * dynamics.INTEGRATION_STEP / context.control_period
+
+
+def nearest_action(wanted_rate, observation, context: Context) -> chex.Array:
+    """The action whose impulse is nearest to I (wanted rate − ω), for a (3,) wanted rate.
+
+    The wanted rate is first scaled back to within the rate limit's margin.
+    """
+    rate = jnp.sqrt(jnp.sum(wanted_rate**2))
+    scale = jnp.minimum(1.0, RATE_MARGIN * context.rate_limit / jnp.maximum(rate, 1e-12))
+    change = wanted_rate * scale - observation[observations.ANGULAR_VELOCITY]
+    impulse = dynamics.angular_momentum(context.inertia, change)
+    missing = context.torque_table * dynamics.INTEGRATION_STEP - impulse
+    return jnp.argmin(jnp.sum(missing**2, axis=-1))
+
+
+CONTROLLERS = {"phase-plane": phase_plane, "feedback": quaternion_feedback}

@@ -1,0 +1,82 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from attjax import AttitudeEnv, controllers, evaluation, observation
+from attjax import quaternion as quaternions
+
+ENV = AttitudeEnv(frameskip=5)
+CONTEXT = ENV.context(ENV.default_params)
+
+
+def act(controller, quaternion, angular_velocity, context=CONTEXT):
+    observed = observation.observe(jnp.array(quaternion, float), jnp.array(angular_velocity, float))
+    return int(jax.jit(controller)(observed, context))
+
+
+def test_rotation_vector_agrees_with_scipy():
+    rng = np.random.default_rng(0)
+    q = rng.normal(size=(100, 4))
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
+    ours = jax.vmap(quaternions.rotation_vector)(jnp.array(q))
+    np.testing.assert_allclose(ours, Rotation.from_quat(q).as_rotvec(), atol=2e-6)
+    assert not quaternions.rotation_vector(jnp.array([0.0, 0, 0, 1])).any()
+
+
+@pytest.mark.parametrize("controller", controllers.CONTROLLERS.values())
+def test_controllers_coast_at_the_goal_and_turn_towards_it(controller):
+    assert act(controller, [0, 0, 0, 1], [0, 0, 0]) == 0
+    for axis in range(3):
+        for sign in (1, -1):
+            quaternion = np.zeros(4)
+            quaternion[axis], quaternion[3] = sign * np.sin(0.5), np.cos(0.5)
+            torque = np.asarray(CONTEXT.torque_table)[act(controller, quaternion, [0, 0, 0])]
+            np.testing.assert_array_equal(np.sign(torque), -sign * np.eye(3)[axis])
+
+
+@pytest.mark.parametrize("controller", controllers.CONTROLLERS.values())
+def test_controllers_take_the_shorter_way(controller):
+    """q and −q are the same attitude."""
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        quaternion = rng.normal(size=4)
+        quaternion /= np.linalg.norm(quaternion)
+        rate = 0.1 * rng.normal(size=3)
+        assert act(controller, quaternion, rate) == act(controller, -quaternion, rate)
+
+
+def test_nearest_action_by_brute_force():
+    rng = np.random.default_rng(2)
+    table, inertia = np.asarray(CONTEXT.torque_table), np.asarray(CONTEXT.inertia)
+    for _ in range(100):
+        rate, wanted = rng.normal(size=(2, 3)) * 10 ** rng.uniform(-4, -1)
+        if np.linalg.norm(wanted) > 0.45:
+            wanted *= 0.45 / np.linalg.norm(wanted)
+        distances = [np.linalg.norm(inertia * (wanted - rate) - row / 240) for row in table]
+        observed = observation.observe(jnp.array([0.0, 0, 0, 1]), jnp.array(rate))
+        ours = controllers.nearest_action(jnp.array(wanted), observed, CONTEXT)
+        assert distances[int(ours)] == pytest.approx(min(distances), rel=1e-4)
+
+
+def test_full_inertia_gives_the_same_actions_as_its_diagonal():
+    full = CONTEXT.replace(inertia=jnp.diag(CONTEXT.inertia))
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        quaternion = rng.normal(size=4)
+        quaternion /= np.linalg.norm(quaternion)
+        rate = 0.1 * rng.normal(size=3)
+        for controller in controllers.CONTROLLERS.values():
+            assert act(controller, quaternion, rate) == act(controller, quaternion, rate, full)
+
+
+@pytest.mark.parametrize(
+    "name, error_deg, settling_s", [("phase-plane", 5e-4, 9.0), ("feedback", 0.02, 25.0)]
+)
+def test_controllers_fly_every_slew(name, error_deg, settling_s):
+    controller = jax.tree_util.Partial(controllers.CONTROLLERS[name])
+    result = evaluation.evaluate(controller, ENV, ENV.default_params, seed=1, episodes=500)
+    assert result["success_rate"] == 1 and result["overspeed_rate"] == 0
+    assert result["terminal"]["error_deg"]["mean"] < error_deg
+    assert result["settling_time_s"]["mean"] < settling_s
