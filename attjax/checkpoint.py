@@ -108,7 +108,10 @@ class Saver:
     def __init__(self, folder: Path):
         self._manager = ocp.CheckpointManager(
             Path(folder).absolute(),
-            options=ocp.CheckpointManagerOptions(max_to_keep=KEPT),
+            # Synchronous: the next block of updates reuses the buffers that are being written.
+            options=ocp.CheckpointManagerOptions(
+                max_to_keep=KEPT, enable_async_checkpointing=False
+            ),
         )
 
     def __enter__(self):
@@ -118,7 +121,7 @@ class Saver:
         self._manager.close()
 
     def save(self, learner: Learner) -> None:
-        """Save in the background; a checkpoint of the same update is left as it is."""
+        """Save at once; a checkpoint of the same update is left as it is."""
         update = int(learner.update)
         if update not in self._manager.all_steps():
             self._manager.save(
