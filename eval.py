@@ -32,6 +32,8 @@ def parse_arguments(argv):
     frameskip_help = "torque-free RK4 steps after an impulse; the control rate is 240/(N + 1) Hz"
     cli.add_number(parser, "frameskip", int, 5, frameskip_help, low=0, below=10_500)
     cli.add_number(parser, "duration", float, 43.75, "length of an episode, s", above=0, high=1e6)
+    plot_help = "also draw figures into this folder (needs the extra plot)"
+    parser.add_argument("--plot", type=Path, metavar="FOLDER", help=plot_help)
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the statistics here")
     return parser.parse_args(argv)
 
@@ -44,6 +46,7 @@ def main(argv=None) -> int:
         steps = _episode_steps(arguments.duration, arguments.frameskip)
 
     # Imported late: with them, --help and errors in the arguments would take seconds.
+    import jax
     import jax.numpy as jnp
 
     from attjax import AttitudeEnv, checkpoint, evaluation, report
@@ -52,15 +55,21 @@ def main(argv=None) -> int:
     with cli.one_line_errors("eval.py", checkpoint.CheckpointError):
         controllers = {name: _controller(name, arguments.checkpoint) for name in names}
         _check_writable(arguments.json)
+        plots = _prepare_plots(arguments.plot)
     env = AttitudeEnv(arguments.frameskip)
     params = env.default_params.replace(max_steps_in_episode=jnp.array(steps, jnp.int32))
     start = time.monotonic()
-    seed = arguments.seed or 0
-    results = [
-        {"controller": name}
-        | evaluation.evaluate(controller, env, params, seed, arguments.episodes)
-        for name, controller in controllers.items()
-    ]
+    seed, results = arguments.seed or 0, []
+    for name, controller in controllers.items():
+        flown = evaluation.fly(controller, env, params, jax.random.key(seed), arguments.episodes)
+        result = evaluation.statistics(flown, env, params)
+        results.append({"controller": name} | result | {"seed": seed})
+        if plots:
+            folder = arguments.plot / name if arguments.compare else arguments.plot
+            flight = plots.Flight(controller, env, params, seed, flown)
+            metrics = arguments.checkpoint / "metrics.csv" if name == POLICY else None
+            for path in plots.write_all(flight, folder, metrics):
+                print(f"wrote {path}")
     if arguments.compare:
         report.print_comparison(results)
     else:
@@ -70,6 +79,21 @@ def main(argv=None) -> int:
         content = {"controllers": results} if arguments.compare else results[0]
         arguments.json.write_text(json.dumps(content, indent=2) + "\n")
     return 0
+
+
+def _prepare_plots(folder):
+    """The module that draws, with its folder made; None where no plots were asked for."""
+    if folder is None:
+        return None
+    try:
+        from attjax import plots
+    except ImportError:
+        raise cli.UserError("--plot needs matplotlib: pip install 'attjax[plot]'") from None
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cli.UserError(f"--plot {folder} cannot be written: {error.strerror}") from None
+    return plots
 
 
 def _controller(name, folder):

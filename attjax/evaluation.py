@@ -9,11 +9,13 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import dynamics
+from attjax import dynamics, spacecraft
+from attjax import observation as observations
 from attjax import quaternion as quaternions
 from attjax.context import Context
+from attjax.controllers import average_torque
 from attjax.env import AttitudeEnv
-from attjax.spacecraft import EnvParams
+from attjax.spacecraft import EnvParams, EnvState
 
 Controller = Callable[[chex.Array, Context], chex.Array]
 """``act(observation (11,), context) -> action``; a pytree, e.g. ``jax.tree_util.Partial``."""
@@ -42,6 +44,21 @@ class Episodes:
     last_outside: chex.Array
     score: chex.Array
     impulse: chex.Array
+
+
+@struct.dataclass
+class History:
+    """Every agent step of some slews; fields are (steps, slews, ...), after each step.
+
+    Attributes:
+        quaternion: (..., 4) error quaternion.
+        angular_velocity: (..., 3) rad/s.
+        torque: (..., 3) torque of the action that led there, N m.
+    """
+
+    quaternion: chex.Array
+    angular_velocity: chex.Array
+    torque: chex.Array
 
 
 @functools.partial(jax.jit, static_argnames=("env", "episodes"))
@@ -82,36 +99,37 @@ def fly(
     return jax.lax.fori_loop(0, steps, step, (observation, state, start))[2]
 
 
-def evaluate(
-    controller: Controller, env: AttitudeEnv, params: EnvParams, seed: int, episodes: int
-) -> dict:
-    """Fly random slews and summarise them.
+@functools.partial(jax.jit, static_argnames=("env", "steps"))
+def record(
+    controller: Controller, env: AttitudeEnv, params: EnvParams, start: EnvState, steps: int
+) -> History:
+    """Fly slews from a batch of states without ending them early, and keep every step."""
 
-    Args:
-        controller: see :data:`Controller`.
-        env: its frameskip is the control rate; its reward is not used.
-        params: spacecraft and task; ``max_steps_in_episode`` is the length of the episodes.
-        seed: of the initial slews.
-        episodes: number of slews.
+    def step(state, _):
+        observation = jax.vmap(observations.observe)(state.quaternion, state.angular_velocity)
+        action = jax.vmap(controller, (0, None))(observation, env.context(params))
+        state = jax.vmap(spacecraft.step, (0, 0, None, None))(state, action, params, env.frameskip)
+        return state, History(state.quaternion, state.angular_velocity, params.torque_table[action])
 
-    Returns:
-        The statistics that ``eval.py --json`` writes; success is φ within the goal angle at
-        the end without having exceeded the rate limit. Settling times are those of the
-        episodes that settle; the others are counted in ``never``.
+    return jax.lax.scan(step, start, length=steps)[1]
+
+
+def statistics(flown: Episodes, env: AttitudeEnv, params: EnvParams) -> dict:
+    """The statistics that ``eval.py --json`` writes of the flown episodes.
+
+    Success is φ within the goal angle at the end without having exceeded the rate limit.
+    Settling times are those of the successes; the other episodes are counted in ``never``.
     """
-    flown = fly(controller, env, params, jax.random.key(seed), episodes)
     flown = jax.tree.map(lambda x: np.asarray(x).astype(float), flown)
-    steps = int(params.max_steps_in_episode)
-    inside = flown.terminal_angle <= float(params.goal_angle)
+    episodes, steps = len(flown.overspeed), int(params.max_steps_in_episode)
     overspeed = flown.overspeed > 0
-    success = inside & ~overspeed
-    settling = (flown.last_outside[success] + 1) * env.control_period
+    success = (flown.terminal_angle <= float(params.goal_angle)) & ~overspeed
+    settling = settling_times(flown, env)[success]
     return {
         "episodes": episodes,
         "frameskip": env.frameskip,
         "control_hz": 1 / env.control_period,
         "duration_s": steps * env.control_period,
-        "seed": seed,
         "success_rate": float(np.mean(success)),
         "overspeed_rate": float(np.mean(overspeed)),
         "closest": _pointing(flown.closest_angle, flown.closest_rate),
@@ -121,6 +139,21 @@ def evaluate(
         "episode_return": summarize(flown.score),
         "impulse_N_m_s": summarize(flown.impulse),
     }
+
+
+def settling_times(flown: Episodes, env: AttitudeEnv) -> np.ndarray:
+    """Time of the first sample from which φ stays within the goal angle, s, (episodes,)."""
+    return (np.asarray(flown.last_outside) + 1) * env.control_period
+
+
+def time_optimal_reference(quaternion: chex.Array, context: Context) -> chex.Array:
+    """Rest-to-rest time of a (4,) slew with decoupled axes, T = 2 √(Σ|θᵢ|Iᵢ/U), s.
+
+    U is the largest torque averaged over a control period. An estimate and no bound: turning
+    about other axes than the eigenaxis can be about a tenth quicker. For diagonal inertia.
+    """
+    angle = jnp.abs(quaternions.rotation_vector(quaternion))
+    return 2 * jnp.sqrt(jnp.sum(angle * context.inertia) / average_torque(context))
 
 
 def summarize(x: np.ndarray) -> dict:

@@ -76,7 +76,8 @@ def test_full_inertia_gives_the_same_actions_as_its_diagonal():
 )
 def test_controllers_fly_every_slew(name, error_deg, settling_s):
     controller = jax.tree_util.Partial(controllers.CONTROLLERS[name])
-    result = evaluation.evaluate(controller, ENV, ENV.default_params, seed=1, episodes=500)
+    flown = evaluation.fly(controller, ENV, ENV.default_params, jax.random.key(1), 500)
+    result = evaluation.statistics(flown, ENV, ENV.default_params)
     assert result["success_rate"] == 1 and result["overspeed_rate"] == 0
     assert result["terminal"]["error_deg"]["mean"] < error_deg
     assert result["settling_time_s"]["mean"] < settling_s

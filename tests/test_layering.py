@@ -17,6 +17,7 @@ LAYERS = [
     {"ppo"},
     {"presets", "assembly"},
     {"checkpoint", "progress", "report", "cli"},
+    {"plots"},
 ]
 LEARNING = {"networks", "losses", "learner", "rollout", "ppo"}
 SPACECRAFT = {"spacecraft", "reward", "env"}

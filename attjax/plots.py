@@ -1,0 +1,214 @@
+"""Figures of an evaluation, written as PNG files. Needs the extra ``plot`` (matplotlib)."""
+
+import csv
+import dataclasses
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import matplotlib
+import numpy as np
+
+from attjax import evaluation
+from attjax import quaternion as quaternions
+from attjax.env import AttitudeEnv
+from attjax.evaluation import Controller, Episodes
+from attjax.report import PAPER_TABLE_2
+from attjax.spacecraft import EnvParams, EnvState
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+TABLE_5 = {
+    "slew1": (0.44228, 0.44228, 0.44228, 0.64279),
+    "slew2": (0.44228, -0.44228, 0.44228, 0.64279),
+    "slew3": (-0.44228, -0.44228, 0.44228, 0.64279),
+}
+"""Initial error quaternions of the paper's three control examples, 100° each."""
+
+PULSES = (-0.5, -0.05, -0.005, 0, 0.005, 0.05, 0.5)
+STYLES = ("-", "--", "-.", ":")
+GOAL_DEG = 0.25
+RANDOM_SLEWS = 200
+
+
+def _save(figure, folder: Path, name: str) -> Path:
+    path = folder / f"{name}.png"
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
+    return path
+
+
+def _at_rest(quaternion) -> EnvState:
+    quaternion = jnp.asarray(quaternion, float)
+    quaternion /= jnp.linalg.norm(quaternion, axis=-1, keepdims=True)
+    n = len(quaternion)
+    return EnvState(quaternion, jnp.zeros((n, 3)), jnp.zeros(n, jnp.int32))
+
+
+def _angles_deg(quaternion):
+    flat = quaternion.reshape(-1, 4)
+    angles = jnp.rad2deg(jax.vmap(quaternions.error_angle)(flat))
+    return np.asarray(angles).reshape(quaternion.shape[:-1])
+
+
+@dataclasses.dataclass(frozen=True)
+class Flight:
+    """A controller, the conditions it flew under, and the outcome of its episodes."""
+
+    controller: Controller
+    env: AttitudeEnv
+    params: EnvParams
+    seed: int
+    flown: Episodes
+
+    @property
+    def hz(self) -> str:
+        """The control rate, for titles."""
+        return f"{1 / self.env.control_period:.2f} Hz"
+
+    def starts(self, n: int) -> EnvState:
+        """The initial states of the first ``n`` of the flown slews."""
+        keys = jax.random.split(jax.random.key(self.seed), len(self.flown.overspeed))[:n]
+        return jax.vmap(self.env.reset, (0, None))(keys, self.params)[1]
+
+    def record(self, start: EnvState):
+        """Time in s, (steps,), and the history of slews from the given states."""
+        steps = int(self.params.max_steps_in_episode)
+        history = evaluation.record(self.controller, self.env, self.params, start, steps)
+        return np.arange(1, steps + 1) * self.env.control_period, history
+
+
+def write_all(flight: Flight, folder: Path, metrics: Path | None) -> list[Path]:
+    """Write every figure into the folder, the learning curve too where there are metrics."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [
+        *slews(flight, folder),
+        error_histories(flight, folder),
+        distributions(flight, folder),
+        settling(flight, folder),
+    ]
+    if metrics is not None and metrics.is_file():
+        paths.append(learning_curve(metrics, folder))
+    return paths
+
+
+def slews(flight: Flight, folder: Path) -> list[Path]:
+    """What the paper's Figs. 5–7 show, of Table 5's slews, and the torques chosen."""
+    time, history = flight.record(_at_rest(list(TABLE_5.values())))
+    angles = _angles_deg(history.quaternion)
+    paths = []
+    for index, name in enumerate(TABLE_5):
+        figure, axes = plt.subplots(4, 1, figsize=(7, 9), sharex=True, layout="constrained")
+        panels = (
+            (history.quaternion, "error quaternion", ("q1", "q2", "q3", "q_s")),
+            (history.angular_velocity, "angular velocity (rad/s)", ("ω1", "ω2", "ω3")),
+            (history.torque, "torque pulses (N m)", ("M1", "M2", "M3")),
+        )
+        for axis, (values, label, names) in zip((axes[0], axes[2], axes[3]), panels):
+            for component, series in enumerate(names):
+                if values is history.torque:
+                    on = np.abs(values[:, index, component]) > 0
+                    y = np.asarray(values[:, index, component])[on]
+                    axis.plot(time[on], y, "xo+"[component], markersize=3, label=series)
+                else:
+                    y = values[:, index, component]
+                    axis.plot(time, y, STYLES[component], linewidth=1.2, label=series)
+            axis.set_ylabel(label)
+            axis.legend(loc="upper right", ncols=4, fontsize=8)
+        axes[3].set_yscale("symlog", linthresh=0.004)
+        axes[3].set_yticks(PULSES, [f"{pulse:g}" for pulse in PULSES])
+        axes[3].set_ylim(-1.5, 1.5)
+        axes[1].semilogy(time, angles[:, index], "k", linewidth=1)
+        axes[1].axhline(GOAL_DEG, color="0.5", linestyle=":", label="0.25°")
+        axes[1].set_ylabel("error angle φ (°)")
+        axes[1].legend(loc="upper right", fontsize=8)
+        axes[3].set_xlabel("time (s)")
+        axes[0].set_title(f"Table 5, test {index + 1}, at {flight.hz}")
+        paths.append(_save(figure, folder, name))
+    return paths
+
+
+def error_histories(flight: Flight, folder: Path) -> Path:
+    """The error angle of random slews over time, with quantiles."""
+    time, history = flight.record(flight.starts(RANDOM_SLEWS))
+    angles = _angles_deg(history.quaternion)
+    figure, axis = plt.subplots(figsize=(7, 4.5), layout="constrained")
+    axis.semilogy(time, angles, color="0.8", linewidth=0.3)
+    for quantile, style in ((0.95, "--"), (0.5, "-"), (0.05, ":")):
+        axis.semilogy(
+            time, np.quantile(angles, quantile, axis=1), "k" + style, label=f"{quantile:.0%}"
+        )
+    axis.axhline(GOAL_DEG, color="tab:red", linestyle="-.", linewidth=1, label="0.25°")
+    axis.set_xlabel("time (s)")
+    axis.set_ylabel("error angle φ (°)")
+    axis.set_title(f"{angles.shape[1]} random slews at {flight.hz}, and quantiles")
+    axis.legend()
+    return _save(figure, folder, "error_histories")
+
+
+def distributions(flight: Flight, folder: Path) -> Path:
+    """Cumulative distribution of the closest and terminal error beside the paper's Table 2."""
+    figure, axes = plt.subplots(1, 2, figsize=(9, 4), sharey=True, layout="constrained")
+    for axis, state in zip(axes, ("closest", "terminal")):
+        ours = np.sort(np.rad2deg(np.asarray(getattr(flight.flown, f"{state}_angle"))))
+        axis.semilogx(ours, np.arange(1, len(ours) + 1) / len(ours), "k", label="this controller")
+        paper = PAPER_TABLE_2[state, "error_deg"][2:]
+        axis.semilogx(paper, (0, 0.25, 0.5, 0.75, 1), "s--", color="tab:red", label="paper")
+        axis.set_xlabel(f"{state} error angle φ (°)")
+        axis.grid(alpha=0.3)
+    axes[0].set_ylabel("share of the slews")
+    axes[0].legend()
+    return _save(figure, folder, "distributions")
+
+
+def settling(flight: Flight, folder: Path) -> Path:
+    """Settling time against slew angle, with the time-optimal reference."""
+    flown, env, params = flight.flown, flight.env, flight.params
+    start = flight.starts(len(flown.overspeed))
+    reference = jax.vmap(evaluation.time_optimal_reference, (0, None))
+    optimal = np.asarray(reference(start.quaternion, env.context(params)))
+    angles = _angles_deg(start.quaternion)
+    settled = (np.asarray(flown.terminal_angle) <= float(params.goal_angle)) & ~np.asarray(
+        flown.overspeed
+    )
+    times = evaluation.settling_times(flown, env)
+    figure, axis = plt.subplots(figsize=(7, 4.5), layout="constrained")
+    axis.plot(angles[settled], times[settled], ".", color="0.6", markersize=2, label="slews")
+    edges = np.linspace(angles.min(), angles.max(), 13)
+    middle = (edges[:-1] + edges[1:]) / 2
+    bins = np.digitize(angles, edges[1:-1])
+    for values, chosen, style, label in (
+        (times, settled, "k-", "their mean"),
+        (optimal, np.ones_like(settled), "k--", "time-optimal reference, mean"),
+    ):
+        means = [np.mean(values[chosen & (bins == b)]) for b in range(12)]
+        axis.plot(middle, means, style, label=label)
+    axis.set_xlabel("slew angle (°)")
+    axis.set_ylabel("settling time to 0.25° (s)")
+    axis.set_title(f"Settling at {flight.hz}")
+    axis.legend()
+    return _save(figure, folder, "settling")
+
+
+def learning_curve(metrics: Path, folder: Path) -> Path:
+    """Return, success and terminal error over agent steps, from a run's metrics.csv."""
+    with metrics.open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["episode_return"]]
+    steps = [int(row["agent_steps"]) / 1e6 for row in rows]
+    columns = (
+        ("episode_return", "return (Eq. 12–13)"),
+        ("success_rate", "success rate"),
+        ("terminal_error_deg", "terminal error (°)"),
+    )
+    figure, axes = plt.subplots(3, 1, figsize=(7, 7), sharex=True, layout="constrained")
+    for axis, (name, label) in zip(axes, columns):
+        axis.plot(steps, [float(row[name]) for row in rows], "k", linewidth=1)
+        axis.set_ylabel(label)
+        axis.grid(alpha=0.3)
+    axes[0].axhline(2500, color="tab:red", linestyle="--", label="the paper's plateau")
+    axes[0].legend()
+    axes[2].set_yscale("log")
+    axes[2].set_xlabel("agent steps (millions)")
+    axes[0].set_title("Learning, exploring policy")
+    return _save(figure, folder, "learning_curve")

@@ -1,0 +1,72 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from attjax import AttitudeEnv, controllers, evaluation, plots
+from attjax import quaternion as quaternions
+from attjax.controllers import average_torque
+from attjax.spacecraft import EnvState
+
+ENV = AttitudeEnv(frameskip=5)
+PARAMS = ENV.default_params.replace(max_steps_in_episode=jnp.array(400, jnp.int32))
+CONTROLLER = jax.tree_util.Partial(controllers.phase_plane)
+
+
+@pytest.fixture(scope="module")
+def flight():
+    flown = evaluation.fly(CONTROLLER, ENV, PARAMS, jax.random.key(2), 100)
+    return plots.Flight(CONTROLLER, ENV, PARAMS, 2, flown)
+
+
+def test_every_figure_is_written(flight, tmp_path):
+    metrics = tmp_path / "metrics.csv"
+    header = "agent_steps,episode_return,success_rate,terminal_error_deg"
+    metrics.write_text(f"{header}\n1000,,,\n2000,100,0.1,20\n3000,900,0.5,1\n")
+    folder = tmp_path / "figures"
+    written = plots.write_all(flight, folder, metrics)
+    names = {path.stem for path in written}
+    assert names == {
+        "slew1", "slew2", "slew3", "error_histories", "distributions", "settling",
+        "learning_curve",
+    }  # fmt: skip
+    for path in written:
+        pixels = plots.plt.imread(path)
+        assert pixels.shape[0] > 500 and pixels[..., :3].std() > 0.01
+
+
+def test_recorded_slews_are_the_flown_ones(flight):
+    """Histories and statistics come from two loops; they must tell of the same flights."""
+    time, history = flight.record(flight.starts(100))
+    assert time[0] == ENV.control_period and len(time) == 400
+    angles = jax.vmap(quaternions.error_angle)(history.quaternion[-1])
+    np.testing.assert_allclose(angles, flight.flown.terminal_angle, atol=2e-6)
+    impulses = np.linalg.norm(history.torque, axis=-1).sum(axis=0) / 240
+    np.testing.assert_allclose(impulses, flight.flown.impulse, rtol=1e-2)
+
+
+def test_table_5_slews_are_100_degrees():
+    for quaternion in plots.TABLE_5.values():
+        angle = np.rad2deg(float(quaternions.error_angle(jnp.array(quaternion))))
+        assert angle == pytest.approx(100, abs=0.01)
+
+
+def test_time_optimal_reference_of_table_5():
+    """17.4 s at 11.43 Hz and 9.3 s at 40 Hz, and a single-axis slew by its closed form."""
+    for frameskip, expected in ((20, 17.4), (5, 9.3)):
+        env = AttitudeEnv(frameskip)
+        context = env.context(env.default_params)
+        time = evaluation.time_optimal_reference(jnp.array(plots.TABLE_5["slew1"]), context)
+        assert float(time) == pytest.approx(expected, abs=0.05)
+    acceleration = float(average_torque(context)) / 0.115
+    about_y = jnp.array([0.0, np.sin(0.5), 0.0, np.cos(0.5)])  # 1 rad: half gained, half braked
+    time = evaluation.time_optimal_reference(about_y, context)
+    assert float(time) == pytest.approx(2 * np.sqrt(1 / acceleration), rel=1e-4)
+
+
+def test_record_keeps_every_step():
+    start = EnvState(jnp.array([[0.0, 0, 0, 1]]), jnp.zeros((1, 3)), jnp.zeros(1, jnp.int32))
+    history = evaluation.record(CONTROLLER, ENV, PARAMS, start, 7)
+    assert history.quaternion.shape == (7, 1, 4)
+    assert history.angular_velocity.shape == history.torque.shape == (7, 1, 3)
+    assert not history.torque.any()
