@@ -89,7 +89,7 @@ class Run:
         self.folder, self.config = folder, config
         self.settings = config.settings
         self.setup = assembly.setup(config.settings)
-        self.env_params = tuple(env.default_params for env in self.setup.envs)
+        self.env_params = assembly.env_params(self.setup)
         self.learner = learner.init(self.setup, self.env_params, jax.random.key(config.seed))
         if checkpoint.latest(folder) is not None:
             with cli.one_line_errors("train.py", checkpoint.CheckpointError):

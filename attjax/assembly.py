@@ -1,6 +1,7 @@
 """From settings to the objects that they describe."""
 
 import jax
+import jax.numpy as jnp
 
 from attjax import learner
 from attjax.env import AttitudeEnv
@@ -23,6 +24,16 @@ def setup(settings: Settings) -> learner.Setup:
     reward = REWARDS[settings.reward]
     envs = tuple(AttitudeEnv(frameskip, reward) for frameskip in settings.frameskips)
     return learner.Setup(envs, policy(settings), settings)
+
+
+def env_params(setup: learner.Setup) -> tuple:
+    """Parameters of each environment, the paper's but for the cap on the episode's length."""
+    cap = setup.settings.max_episode_steps
+    defaults = [env.default_params for env in setup.envs]
+    return tuple(
+        params.replace(max_steps_in_episode=jnp.minimum(params.max_steps_in_episode, cap))
+        for params in defaults
+    )
 
 
 def initial_parameters(policy: Policy) -> dict:

@@ -37,6 +37,9 @@ class Settings:
     time_limit_terminates: bool = setting(
         "learn the time limit as an end, as the paper did; otherwise bootstrap there"
     )
+    max_episode_steps: int = setting(
+        "cap on an episode's agent steps in training, beside its 43.75 s", low=1
+    )
     stagger_episodes: bool = setting(
         "start the first episodes at random times, so that they do not end all at once"
     )

@@ -100,7 +100,7 @@ def test_a_short_training_improves_the_return():
         reward_scale=0.01,
         minibatch_size=512,
     )
-    env_params = tuple(env.default_params for env in setup.envs)
+    env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(0))
     returns = []
     for _ in range(4):
@@ -115,7 +115,7 @@ def test_a_short_training_improves_the_return():
 
 def test_one_compilation_serves_blocks_of_any_length():
     setup = small_attitude_setup(10)
-    env_params = tuple(env.default_params for env in setup.envs)
+    env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(0))
     before = ppo.train_block._cache_size()
     for length in (1, 2, 3):
@@ -126,7 +126,7 @@ def test_one_compilation_serves_blocks_of_any_length():
 
 def test_blocks_of_any_length_give_the_same_bits():
     setup = small_attitude_setup(4)
-    env_params = tuple(env.default_params for env in setup.envs)
+    env_params = assembly.env_params(setup)
     results = []
     for lengths in ((4,), (1, 3)):
         state = learner.init(setup, env_params, jax.random.key(7))
@@ -155,7 +155,7 @@ def test_spacecraft_are_shared_out_among_the_control_rates():
     sizes = [group.stop - group.start for group in setup.slices]
     assert sum(sizes) == 64 and set(sizes) == {12, 13}
     assert [env.frameskip for env in setup.envs] == [5, 7, 10, 14, 20]
-    env_params = tuple(env.default_params for env in setup.envs)
+    env_params = assembly.env_params(setup)
     contexts = [env.context(p) for env, p in zip(setup.envs, env_params)]
     discounts = ppo.discounts(setup, contexts)
     for env, group in zip(setup.envs, setup.slices):
@@ -165,11 +165,20 @@ def test_spacecraft_are_shared_out_among_the_control_rates():
         assert float(features[37]) == pytest.approx(10 * env.control_period)
 
 
+def test_training_episodes_are_capped_in_agent_steps():
+    """The slow rates keep their 43.75 s, the fast ones are cut; the paper's are untouched."""
+    setup = small_attitude_setup(1, frameskips=(5, 7, 10, 14, 20), max_episode_steps=700)
+    limits = [int(params.max_steps_in_episode) for params in assembly.env_params(setup)]
+    assert limits == [700, 700, 700, 700, 500]
+    paper = assembly.setup(presets.PAPER)
+    assert [int(p.max_steps_in_episode) for p in assembly.env_params(paper)] == [500]
+
+
 def test_staggered_episodes_start_at_random_times():
     staggered = small_attitude_setup(1)
-    env_params = tuple(env.default_params for env in staggered.envs)
+    env_params = assembly.env_params(staggered)
     times = learner.init(staggered, env_params, jax.random.key(0)).env_states[0].time
-    assert len(set(times.tolist())) > 5 and int(times.max()) < 1750
+    assert len(set(times.tolist())) > 5 and int(times.max()) < 700
     together = dataclasses.replace(
         staggered, settings=dataclasses.replace(staggered.settings, stagger_episodes=False)
     )
@@ -179,7 +188,7 @@ def test_staggered_episodes_start_at_random_times():
 @pytest.mark.parametrize("spoiled", ["observations", "parameters"])
 def test_divergence_names_its_first_update(spoiled):
     setup = small_attitude_setup(4)
-    env_params = tuple(env.default_params for env in setup.envs)
+    env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(0))
     if spoiled == "observations":
         states = state.env_states
