@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.live import Live
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TextColumn
 
 METRICS = "metrics.csv"
+WIDTH_FOR_BAR = 100
 COLUMNS = (
     "agent_steps", "wall_s", "episodes", "episode_return", "episode_return_std",
     "episode_return_n", "success_rate", "overspeed_rate", "terminal_error_deg",
@@ -80,44 +80,39 @@ class ProgressLine:
 
     def __init__(self, total_steps: int, done_steps: int):
         self._total, self._start_steps = total_steps, done_steps
-        self._console = Console(highlight=False)
-        self._progress = Progress(
-            BarColumn(bar_width=20),
-            TextColumn("{task.fields[text]}"),
-            TextColumn("ETA"),
-            TimeRemainingColumn(compact=True),
-            console=self._console,
-        )
+        console = Console(highlight=False)
+        self._is_live = console.is_terminal
+        bar = [BarColumn(bar_width=None)] if console.width >= WIDTH_FOR_BAR else []
+        columns = [*bar, TextColumn("{task.fields[text]}")]
+        self._progress = Progress(*columns, console=console, expand=True)
         self._task = self._progress.add_task(
             "", total=total_steps, completed=done_steps, text="first block"
         )
-        is_terminal = self._console.is_terminal
-        self._live = Live(self._progress, console=self._console) if is_terminal else None
 
     def __enter__(self):
         self._start = time.monotonic()
-        if self._live:
-            self._live.__enter__()
+        if self._is_live:
+            self._progress.start()
         return self
 
     def __exit__(self, *exception):
-        if self._live:
-            self._live.__exit__(*exception)
+        if self._is_live:
+            self._progress.stop()
 
     def show(self, row: dict) -> None:
         """Show a row of metrics."""
         steps, elapsed = row["agent_steps"], time.monotonic() - self._start
         rate = (steps - self._start_steps) / max(elapsed, 1e-9)
+        minutes, seconds = divmod(round((self._total - steps) / rate), 60)
         text = (
-            f"{steps / 1e6:.2f}M/{self._total / 1e6:.2f}M steps  {_thousands(rate)} steps/s  "
-            f"return {_number(row['episode_return'], '.0f')}  "
-            f"success {_number(row['success_rate'], '.1%')}  "
+            f"{steps / 1e6:.3g}/{self._total / 1e6:.3g}M steps {_thousands(rate)}/s "
+            f"ETA {minutes}:{seconds:02}  return {_number(row['episode_return'], '.0f')} "
+            f"success {_number(row['success_rate'], '.1%')} "
             f"error {_number(row['terminal_error_deg'], '.3g')}°"
         )
         self._progress.update(self._task, completed=steps, text=text)
-        if not self._live:
-            remaining = (self._total - steps) / rate
-            print(f"{text}  ETA {remaining // 60:.0f}:{remaining % 60:02.0f}", flush=True)
+        if not self._is_live:
+            print(text, flush=True)
 
 
 def _number(value, form):

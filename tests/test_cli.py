@@ -48,7 +48,7 @@ def trained(tmp_path_factory):
 def test_training_reports_and_keeps_metrics(trained):
     folder, output = trained
     assert "7,680 agent steps (60 updates of 128)" in output
-    assert "compiled in" in output and "steps/s" in output and "ETA" in output
+    assert "compiled in" in output and "M steps" in output and "ETA" in output
     assert output.strip().splitlines()[-1].endswith(f"python eval.py --checkpoint {folder}")
     rows = metrics(folder)
     assert [int(row["agent_steps"]) for row in rows] == list(range(256, 7681, 256))
@@ -116,7 +116,7 @@ def test_a_stopped_run_goes_on_to_the_same_bits(trained, tmp_path):
     command = [sys.executable, str(ROOT / "train.py"), *map(str, arguments)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         for line in process.stdout:
-            if "steps/s" in line:
+            if "ETA" in line:
                 process.send_signal(signal.SIGTERM)
                 break
         output = process.stdout.read()
