@@ -60,10 +60,11 @@ def main(argv=None) -> int:
     params = env.default_params.replace(max_steps_in_episode=jnp.array(steps, jnp.int32))
     start = time.monotonic()
     seed, results = arguments.seed or 0, []
+    conditions = evaluation.conditions(env, params, seed, arguments.episodes)
     for name, controller in controllers.items():
         flown = evaluation.fly(controller, env, params, jax.random.key(seed), arguments.episodes)
-        result = evaluation.statistics(flown, env, params)
-        results.append({"controller": name} | result | {"seed": seed})
+        statistics = evaluation.statistics(flown, env, params)
+        results.append({"controller": name} | conditions | statistics)
         if plots:
             folder = arguments.plot / name if arguments.compare else arguments.plot
             flight = plots.Flight(controller, env, params, seed, flown)

@@ -114,6 +114,17 @@ def record(
     return jax.lax.scan(step, start, length=steps)[1]
 
 
+def conditions(env: AttitudeEnv, params: EnvParams, seed: int, episodes: int) -> dict:
+    """What the episodes of :func:`fly` have in common, for ``eval.py --json``."""
+    return {
+        "episodes": episodes,
+        "frameskip": env.frameskip,
+        "control_hz": 1 / env.control_period,
+        "duration_s": int(params.max_steps_in_episode) * env.control_period,
+        "seed": seed,
+    }
+
+
 def statistics(flown: Episodes, env: AttitudeEnv, params: EnvParams) -> dict:
     """The statistics that ``eval.py --json`` writes of the flown episodes.
 
@@ -121,21 +132,16 @@ def statistics(flown: Episodes, env: AttitudeEnv, params: EnvParams) -> dict:
     Settling times are those of the successes; the other episodes are counted in ``never``.
     """
     flown = jax.tree.map(lambda x: np.asarray(x).astype(float), flown)
-    episodes, steps = len(flown.overspeed), int(params.max_steps_in_episode)
     overspeed = flown.overspeed > 0
     success = (flown.terminal_angle <= float(params.goal_angle)) & ~overspeed
     settling = settling_times(flown, env)[success]
     return {
-        "episodes": episodes,
-        "frameskip": env.frameskip,
-        "control_hz": 1 / env.control_period,
-        "duration_s": steps * env.control_period,
         "success_rate": float(np.mean(success)),
         "overspeed_rate": float(np.mean(overspeed)),
         "closest": _pointing(flown.closest_angle, flown.closest_rate),
         "terminal": _pointing(flown.terminal_angle, flown.terminal_rate),
         "terminal_success": _pointing(flown.terminal_angle[success], flown.terminal_rate[success]),
-        "settling_time_s": summarize(settling) | {"never": episodes - len(settling)},
+        "settling_time_s": summarize(settling) | {"never": len(success) - len(settling)},
         "episode_return": summarize(flown.score),
         "impulse_N_m_s": summarize(flown.impulse),
     }

@@ -33,7 +33,8 @@ def with_steps(env, steps):
 
 def evaluate(controller, env, params, seed, episodes):
     flown = evaluation.fly(controller, env, params, jax.random.key(seed), episodes)
-    return evaluation.statistics(flown, env, params)
+    conditions = evaluation.conditions(env, params, seed, episodes)
+    return conditions | evaluation.statistics(flown, env, params)
 
 
 def test_statistics_agree_with_a_plain_loop():
