@@ -16,6 +16,7 @@ import orbax.checkpoint as ocp
 
 from attjax import assembly, settings
 from attjax.learner import Learner
+from attjax.progress import METRICS
 from attjax.settings import Settings
 
 FORMAT = 1
@@ -45,8 +46,9 @@ def create(folder: Path, config: Config, overwrite: bool) -> None:
     """Prepare a folder for a new run.
 
     Raises:
-        CheckpointError: it holds a run and ``overwrite`` is false, holds something else, or
-            cannot be written. It is left as it was.
+        CheckpointError: it holds a run and ``overwrite`` is false, holds only something else,
+            or cannot be written. It is left as it was. Other files beside a run that is
+            overwritten stay.
     """
     folder = Path(folder)
     try:
@@ -59,7 +61,7 @@ def create(folder: Path, config: Config, overwrite: bool) -> None:
                 )
             read_config(folder)
             _remove_run(folder)
-        if any(folder.iterdir()):
+        elif any(folder.iterdir()):
             raise CheckpointError(
                 f"{folder} is not empty and holds no attjax run; choose another folder"
             )
@@ -185,5 +187,5 @@ def _remove_run(folder):
         is_checkpoint = path.is_dir() and path.name.split(".")[0].isdigit()
         if is_checkpoint:
             shutil.rmtree(path)
-        elif path.name in (CONFIG, CONFIG + ".tmp", "metrics.csv"):
+        elif path.name.removesuffix(".tmp") in (CONFIG, METRICS):
             path.unlink()

@@ -52,7 +52,7 @@ class MetricsFile:
             with self._path.open(newline="") as file:
                 rows = [r for r in csv.DictReader(file) if int(r["agent_steps"]) <= resume_at]
         self.wall_s = float(rows[-1]["wall_s"]) if rows else 0.0
-        temporary = self._path.with_suffix(".csv.tmp")
+        temporary = folder / (METRICS + ".tmp")
         temporary.write_text(_csv_text(rows, header=True))
         os.replace(temporary, self._path)
 

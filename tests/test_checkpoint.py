@@ -93,8 +93,10 @@ def test_overwrite_removes_the_run_and_nothing_else(tmp_path):
     checkpoint.create(tmp_path, CONFIG, overwrite=False)
     (tmp_path / "7").mkdir()
     (tmp_path / "metrics.csv").write_text("x")
+    (tmp_path / "metrics.csv.tmp").write_text("x")
+    (tmp_path / "figure.png").write_text("precious")
     checkpoint.create(tmp_path, CONFIG, overwrite=True)
-    assert [p.name for p in tmp_path.iterdir()] == ["config.json"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["config.json", "figure.png"]
 
 
 def test_folders_with_other_files_are_refused_and_kept(tmp_path):

@@ -16,7 +16,8 @@ LAYERS = [
     {"rollout"},
     {"ppo"},
     {"presets", "assembly"},
-    {"checkpoint", "progress", "report", "cli"},
+    {"progress", "report", "cli"},
+    {"checkpoint"},
     {"plots"},
 ]
 LEARNING = {"networks", "losses", "learner", "rollout", "ppo"}
