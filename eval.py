@@ -49,7 +49,7 @@ def main(argv=None) -> int:
     import jax
     import jax.numpy as jnp
 
-    from attjax import AttitudeEnv, checkpoint, evaluation, report
+    from attjax import AttitudeEnv, checkpoint, evaluation, progress, report
 
     names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
     with cli.one_line_errors("eval.py", checkpoint.CheckpointError):
@@ -68,7 +68,7 @@ def main(argv=None) -> int:
         if plots:
             folder = arguments.plot / name if arguments.compare else arguments.plot
             flight = plots.Flight(controller, env, params, seed, flown)
-            metrics = arguments.checkpoint / "metrics.csv" if name == POLICY else None
+            metrics = arguments.checkpoint / progress.METRICS if name == POLICY else None
             for path in plots.write_all(flight, folder, metrics):
                 print(f"wrote {path}")
     if arguments.compare:

@@ -28,7 +28,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str):
         """Print the message as one line and exit."""
-        sys.exit(_print_error(self.prog, message))
+        _fail(self.prog, message)
 
 
 @contextlib.contextmanager
@@ -37,12 +37,12 @@ def one_line_errors(prog: str, *kinds: type[Exception]):
     try:
         yield
     except (UserError, *kinds) as error:
-        sys.exit(_print_error(prog, error))
+        _fail(prog, error)
 
 
-def _print_error(prog, message):
+def _fail(prog, message):
     print(f"{prog}: error: {' '.join(str(message).split())}", file=sys.stderr)
-    return BAD_INPUT
+    sys.exit(BAD_INPUT)
 
 
 def add_common(parser: argparse.ArgumentParser, seed_help: str) -> None:

@@ -61,12 +61,17 @@ class History:
     torque: chex.Array
 
 
+def random_slews(env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, episodes: int):
+    """Observations (episodes, 11) and states at the start of ``episodes`` random slews."""
+    return jax.vmap(env.reset, (0, None))(jax.random.split(key, episodes), params)
+
+
 @functools.partial(jax.jit, static_argnames=("env", "episodes"))
 def fly(
     controller: Controller, env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, episodes: int
 ) -> Episodes:
     """Fly ``episodes`` random slews of ``params.max_steps_in_episode`` steps each."""
-    observation, state = jax.vmap(env.reset, (0, None))(jax.random.split(key, episodes), params)
+    observation, state = random_slews(env, params, key, episodes)
     context = env.context(params)
 
     def step(index, carry):
@@ -128,16 +133,14 @@ def conditions(env: AttitudeEnv, params: EnvParams, seed: int, episodes: int) ->
 def statistics(flown: Episodes, env: AttitudeEnv, params: EnvParams) -> dict:
     """The statistics that ``eval.py --json`` writes of the flown episodes.
 
-    Success is φ within the goal angle at the end without having exceeded the rate limit.
     Settling times are those of the successes; the other episodes are counted in ``never``.
     """
+    success = successes(flown, params)
     flown = jax.tree.map(lambda x: np.asarray(x).astype(float), flown)
-    overspeed = flown.overspeed > 0
-    success = (flown.terminal_angle <= float(params.goal_angle)) & ~overspeed
     settling = settling_times(flown, env)[success]
     return {
         "success_rate": float(np.mean(success)),
-        "overspeed_rate": float(np.mean(overspeed)),
+        "overspeed_rate": float(np.mean(flown.overspeed)),
         "closest": _pointing(flown.closest_angle, flown.closest_rate),
         "terminal": _pointing(flown.terminal_angle, flown.terminal_rate),
         "terminal_success": _pointing(flown.terminal_angle[success], flown.terminal_rate[success]),
@@ -145,6 +148,11 @@ def statistics(flown: Episodes, env: AttitudeEnv, params: EnvParams) -> dict:
         "episode_return": summarize(flown.score),
         "impulse_N_m_s": summarize(flown.impulse),
     }
+
+
+def successes(flown: Episodes, params: EnvParams) -> np.ndarray:
+    """(episodes,) bool: φ within the goal angle at the end, the rate limit never exceeded."""
+    return np.asarray((flown.terminal_angle <= params.goal_angle) & ~flown.overspeed)
 
 
 def settling_times(flown: Episodes, env: AttitudeEnv) -> np.ndarray:

@@ -67,10 +67,11 @@ class Flight:
         """The control rate, for titles."""
         return f"{1 / self.env.control_period:.2f} Hz"
 
-    def starts(self, n: int) -> EnvState:
-        """The initial states of the first ``n`` of the flown slews."""
-        keys = jax.random.split(jax.random.key(self.seed), len(self.flown.overspeed))[:n]
-        return jax.vmap(self.env.reset, (0, None))(keys, self.params)[1]
+    @property
+    def starts(self) -> EnvState:
+        """The initial states of the flown slews."""
+        key, episodes = jax.random.key(self.seed), len(self.flown.overspeed)
+        return evaluation.random_slews(self.env, self.params, key, episodes)[1]
 
     def record(self, start: EnvState):
         """Time in s, (steps,), and the history of slews from the given states."""
@@ -96,42 +97,44 @@ def write_all(flight: Flight, folder: Path, metrics: Path | None) -> list[Path]:
 def slews(flight: Flight, folder: Path) -> list[Path]:
     """What the paper's Figs. 5–7 show, of Table 5's slews, and the torques chosen."""
     time, history = flight.record(_at_rest(list(TABLE_5.values())))
-    angles = _angles_deg(history.quaternion)
     paths = []
     for index, name in enumerate(TABLE_5):
+        one = jax.tree.map(lambda x, index=index: np.asarray(x[:, index]), history)
         figure, axes = plt.subplots(4, 1, figsize=(7, 9), sharex=True, layout="constrained")
-        panels = (
-            (history.quaternion, "error quaternion", ("q1", "q2", "q3", "q_s")),
-            (history.angular_velocity, "angular velocity (rad/s)", ("ω1", "ω2", "ω3")),
-            (history.torque, "torque pulses (N m)", ("M1", "M2", "M3")),
-        )
-        for axis, (values, label, names) in zip((axes[0], axes[2], axes[3]), panels):
-            for component, series in enumerate(names):
-                if values is history.torque:
-                    on = np.abs(values[:, index, component]) > 0
-                    y = np.asarray(values[:, index, component])[on]
-                    axis.plot(time[on], y, "xo+"[component], markersize=3, label=series)
-                else:
-                    y = values[:, index, component]
-                    axis.plot(time, y, STYLES[component], linewidth=1.2, label=series)
-            axis.set_ylabel(label)
-            axis.legend(loc="upper right", ncols=4, fontsize=8)
-        axes[3].set_yscale("symlog", linthresh=0.004)
-        axes[3].set_yticks(PULSES, [f"{pulse:g}" for pulse in PULSES])
-        axes[3].set_ylim(-1.5, 1.5)
-        axes[1].semilogy(time, angles[:, index], "k", linewidth=1)
+        _plot_components(axes[0], time, one.quaternion, ("q1", "q2", "q3", "q_s"))
+        _plot_components(axes[2], time, one.angular_velocity, ("ω1", "ω2", "ω3"))
+        _plot_pulses(axes[3], time, one.torque)
+        axes[1].semilogy(time, _angles_deg(one.quaternion), "k", linewidth=1)
         axes[1].axhline(GOAL_DEG, color="0.5", linestyle=":", label="0.25°")
-        axes[1].set_ylabel("error angle φ (°)")
         axes[1].legend(loc="upper right", fontsize=8)
+        labels = ("error quaternion", "error angle φ (°)", "angular velocity (rad/s)")
+        for axis, label in zip(axes, (*labels, "torque pulses (N m)")):
+            axis.set_ylabel(label)
         axes[3].set_xlabel("time (s)")
         axes[0].set_title(f"Table 5, test {index + 1}, at {flight.hz}")
         paths.append(_save(figure, folder, name))
     return paths
 
 
+def _plot_components(axis, time, values, names):
+    for values_, name, style in zip(values.T, names, STYLES):
+        axis.plot(time, values_, style, linewidth=1.2, label=name)
+    axis.legend(loc="upper right", ncols=4, fontsize=8)
+
+
+def _plot_pulses(axis, time, torque):
+    for values, name, marker in zip(torque.T, ("M1", "M2", "M3"), "xo+"):
+        on = values != 0
+        axis.plot(time[on], values[on], marker, markersize=3, label=name)
+    axis.set_yscale("symlog", linthresh=0.004)
+    axis.set_yticks(PULSES, [f"{pulse:g}" for pulse in PULSES])
+    axis.set_ylim(-1.5, 1.5)
+    axis.legend(loc="upper right", ncols=4, fontsize=8)
+
+
 def error_histories(flight: Flight, folder: Path) -> Path:
     """The error angle of random slews over time, with quantiles."""
-    time, history = flight.record(flight.starts(RANDOM_SLEWS))
+    time, history = flight.record(jax.tree.map(lambda x: x[:RANDOM_SLEWS], flight.starts))
     angles = _angles_deg(history.quaternion)
     figure, axis = plt.subplots(figsize=(7, 4.5), layout="constrained")
     axis.semilogy(time, angles, color="0.8", linewidth=0.3)
@@ -165,13 +168,11 @@ def distributions(flight: Flight, folder: Path) -> Path:
 def settling(flight: Flight, folder: Path) -> Path:
     """Settling time against slew angle, with the time-optimal reference."""
     flown, env, params = flight.flown, flight.env, flight.params
-    start = flight.starts(len(flown.overspeed))
+    start = flight.starts.quaternion
     reference = jax.vmap(evaluation.time_optimal_reference, (0, None))
-    optimal = np.asarray(reference(start.quaternion, env.context(params)))
-    angles = _angles_deg(start.quaternion)
-    settled = (np.asarray(flown.terminal_angle) <= float(params.goal_angle)) & ~np.asarray(
-        flown.overspeed
-    )
+    optimal = np.asarray(reference(start, env.context(params)))
+    angles = _angles_deg(start)
+    settled = evaluation.successes(flown, params)
     times = evaluation.settling_times(flown, env)
     figure, axis = plt.subplots(figsize=(7, 4.5), layout="constrained")
     axis.plot(angles[settled], times[settled], ".", color="0.6", markersize=2, label="slews")

@@ -18,13 +18,28 @@ PAPER_TABLE_2 = {
 }  # fmt: skip
 """Table 2 of the paper, in the order of STATISTICS; angles in degrees, rates in rad/s."""
 
+POINTING_ROWS = {
+    "terminal φ, mean (°)": ("terminal", "error_deg", "mean"),
+    "terminal φ, max (°)": ("terminal", "error_deg", "max"),
+    "terminal ‖ω‖, mean (rad/s)": ("terminal", "rate_rad_s", "mean"),
+    "closest φ, mean (°)": ("closest", "error_deg", "mean"),
+    "closest φ, max (°)": ("closest", "error_deg", "max"),
+}
+OTHER_ROWS = {
+    "settling time, mean (s)": ("settling_time_s", "mean"),
+    "settling time, max (s)": ("settling_time_s", "max"),
+    "return, mean (Eq. 12-13)": ("episode_return", "mean"),
+    "impulse, mean (N m s)": ("impulse_N_m_s", "mean"),
+}
+"""Rows of the comparison; the paper has figures for the pointing only."""
+
 TABLE_WIDTH = 100
 ROW_NAMES = ("Mean", "Std. dev.", "Min", "Q1", "Q2", "Q3", "Max")
 SYMBOLS = {"error_deg": "φ (°)", "rate_rad_s": "‖ω‖ (rad/s)"}
 
 
 def print_report(result: dict) -> None:
-    """Print what ``evaluation.evaluate`` returns, with the controller's name."""
+    """Print one controller's name, conditions and statistics, as in ``eval.py --json``."""
     console = _console()
     console.print(f"{result['controller']}: {_conditions(result)}\n")
     console.print(_table_2(result))
@@ -41,8 +56,15 @@ def print_comparison(results: list[dict]) -> None:
     for result in results:
         table.add_column(result["controller"], justify="right", no_wrap=True)
     table.add_column("paper", justify="right", no_wrap=True, style="dim")
-    for name, cell in COMPARED.items():
-        table.add_row(name, *map(cell, results), PAPER_COMPARED.get(name, ""))
+    table.add_row("success (%)", *(f"{100 * r['success_rate']:.2f}" for r in results), "100.00")
+    table.add_row("overspeed (%)", *(f"{100 * r['overspeed_rate']:.2f}" for r in results))
+    for name, (state, quantity, statistic) in POINTING_ROWS.items():
+        ours = [_fixed(r[state][quantity][statistic]) for r in results]
+        paper = PAPER_TABLE_2[state, quantity][STATISTICS.index(statistic)]
+        table.add_row(name, *ours, _fixed(paper))
+    for name, (quantity, statistic) in OTHER_ROWS.items():
+        values = [r[quantity][statistic] for r in results]
+        table.add_row(name, *("–" if x is None else f"{x:.2f}" for x in values))
     console.print(table)
 
 
@@ -106,39 +128,3 @@ def _summary(result):
 def _fixed(value):
     """Six decimals like the paper's table; two digits where those would show nothing."""
     return f"{value:.6f}" if value >= 9.5e-6 else f"{value:.1e}"
-
-
-def _statistic(group, quantity, statistic):
-    def cell(result):
-        value = (result[group][quantity] if quantity else result[group])[statistic]
-        if value is None:
-            return "–"
-        return _fixed(value) if quantity else f"{value:.2f}"
-
-    return cell
-
-
-COMPARED = {
-    "success (%)": lambda result: f"{100 * result['success_rate']:.2f}",
-    "overspeed (%)": lambda result: f"{100 * result['overspeed_rate']:.2f}",
-    "terminal φ, mean (°)": _statistic("terminal", "error_deg", "mean"),
-    "terminal φ, max (°)": _statistic("terminal", "error_deg", "max"),
-    "terminal ‖ω‖, mean (rad/s)": _statistic("terminal", "rate_rad_s", "mean"),
-    "closest φ, mean (°)": _statistic("closest", "error_deg", "mean"),
-    "closest φ, max (°)": _statistic("closest", "error_deg", "max"),
-    "settling time, mean (s)": _statistic("settling_time_s", None, "mean"),
-    "settling time, max (s)": _statistic("settling_time_s", None, "max"),
-    "return, mean (Eq. 12-13)": _statistic("episode_return", None, "mean"),
-    "impulse, mean (N m s)": _statistic("impulse_N_m_s", None, "mean"),
-}
-"""Rows of the comparison: a name, and the function that gives a result's cell."""
-
-PAPER_COMPARED = {
-    "success (%)": "100.00",
-    "terminal φ, mean (°)": "0.001954",
-    "terminal φ, max (°)": "0.004558",
-    "terminal ‖ω‖, mean (rad/s)": "0.001752",
-    "closest φ, mean (°)": "0.000380",
-    "closest φ, max (°)": "0.001980",
-}
-"""What the paper gives of these, all at 40 Hz."""

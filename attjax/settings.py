@@ -120,33 +120,32 @@ def from_json(values: dict) -> Settings:
     return Settings(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
 
 
-def describe_limits(metadata) -> str:
-    """The allowed values of a setting, for help texts and errors."""
-    if "choices" in metadata:
-        return "one of " + ", ".join(metadata["choices"])
-    words = {"low": "at least", "above": "above", "high": "at most", "below": "below"}
-    return " and ".join(f"{word} {metadata[k]}" for k, word in words.items() if k in metadata)
-
-
 def check(field: dataclasses.Field, value) -> None:
     """Raise ValueError, naming what is allowed, unless ``value`` fits the setting."""
     is_tuple = field.type == tuple[int, ...]
-    element_type = int if is_tuple else field.type
+    kind = int if is_tuple else field.type
     elements = value if is_tuple else (value,)
-    limits = field.metadata
-    valid = isinstance(elements, tuple) and len(elements) > 0
-    for x in elements if valid else ():
-        valid &= type(x) is element_type or (element_type is float and type(x) is int)
-        valid = valid and ("choices" not in limits or x in limits["choices"])
-        if valid and element_type in (int, float):
-            valid = (
-                math.isfinite(x)
-                and limits.get("low", x) <= x <= limits.get("high", x)
-                and not x <= limits.get("above", -math.inf)
-                and not x >= limits.get("below", math.inf)
-            )
-    if not valid:
-        kind = {int: "an integer", float: "a number", bool: "true or false"}.get(element_type, "")
-        kind = "integers" if is_tuple else kind
-        allowed = " ".join(filter(None, [kind, describe_limits(limits)]))
-        raise ValueError(f"{field.name} is {value!r}; it must be {allowed}")
+    fits = isinstance(elements, tuple) and len(elements) > 0
+    if not (fits and all(_fits(kind, field.metadata, x) for x in elements)):
+        name = {int: "an integer", float: "a number", bool: "true or false"}.get(kind, "")
+        allowed = ["integers" if is_tuple else name, _describe(field.metadata)]
+        raise ValueError(f"{field.name} is {value!r}; it must be {' '.join(filter(None, allowed))}")
+
+
+def _fits(kind, limits, x):
+    if type(x) is not kind and not (kind is float and type(x) is int):
+        return False
+    if kind not in (int, float):
+        return x in limits.get("choices", (x,))
+    return (
+        math.isfinite(x)
+        and limits.get("low", x) <= x <= limits.get("high", x)
+        and limits.get("above", -math.inf) < x < limits.get("below", math.inf)
+    )
+
+
+def _describe(limits):
+    if "choices" in limits:
+        return "one of " + ", ".join(limits["choices"])
+    words = {"low": "at least", "above": "above", "high": "at most", "below": "below"}
+    return " and ".join(f"{word} {limits[k]}" for k, word in words.items() if k in limits)

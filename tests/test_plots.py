@@ -37,7 +37,7 @@ def test_every_figure_is_written(flight, tmp_path):
 
 def test_recorded_slews_are_the_flown_ones(flight):
     """Histories and statistics come from two loops; they must tell of the same flights."""
-    time, history = flight.record(flight.starts(100))
+    time, history = flight.record(flight.starts)
     assert time[0] == ENV.control_period and len(time) == 400
     angles = jax.vmap(quaternions.error_angle)(history.quaternion[-1])
     np.testing.assert_allclose(angles, flight.flown.terminal_angle, atol=2e-6)
