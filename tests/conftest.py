@@ -1,5 +1,6 @@
 import jax
 import pytest
+from commands import STEPS_PER_UPDATE, TINY, run
 
 
 @pytest.fixture
@@ -14,3 +15,12 @@ def strict_promotion():
     """Arrays of different types must not be combined (optax itself does, so not for all)."""
     with jax.numpy_dtype_promotion("strict"):
         yield
+
+
+@pytest.fixture(scope="session")
+def trained(tmp_path_factory):
+    """A short run, and what train.py printed."""
+    folder = tmp_path_factory.mktemp("runs") / "ckpt"
+    result = run("train.py", *TINY, "--total-steps", 60 * STEPS_PER_UPDATE, "--checkpoint", folder)
+    assert result.returncode == 0, result.stderr
+    return folder, result.stdout
