@@ -99,10 +99,35 @@ def rate_after_impulse(angular_velocity, torque, inertia):
 
 
 def angular_momentum(inertia, angular_velocity):
-    """I ω, N m s, for an inertia (3,) or (3, 3) and a (3,) angular velocity."""
+    """I ω, N m s, for an inertia (3,) or (3, 3) and (..., 3) angular velocities."""
     if inertia.ndim == 1:
         return inertia * angular_velocity
-    return jnp.sum(inertia * angular_velocity, axis=-1)
+    return jnp.matmul(angular_velocity, inertia, precision="highest")
+
+
+def peak_rate(angular_velocity, inertia):
+    """Largest ‖ω‖ that the spacecraft comes to while it coasts on without torque.
+
+    Coasting conserves 2T = ω·Iω and H = ‖Iω‖. In the principal axes, each
+    (Iᵢ − I_min)(I_max − Iᵢ) ≥ 0, so ‖ω‖² ≤ (2T (I_min + I_max) − H²) / (I_min I_max), with
+    equality where the rate about the intermediate axis passes through zero.
+
+    Args:
+        angular_velocity: (..., 3) body frame, rad/s.
+        inertia: (3,) or (3, 3), kg m².
+
+    Returns:
+        (...) rad/s.
+
+    Example: a turn about the intermediate axis is unstable and can gain 23 %.
+        >>> round(peak_rate(jnp.array([0.0, 0.0, 0.4]), jnp.array(LM50_INERTIA)).item(), 4)
+        0.4915
+    """
+    moments = inertia if inertia.ndim == 1 else jnp.linalg.eigvalsh(inertia)
+    low, high = jnp.min(moments), jnp.max(moments)
+    momentum = angular_momentum(inertia, angular_velocity)
+    complement = (low + high) * angular_velocity - momentum
+    return jnp.sqrt(jnp.sum(momentum * complement, axis=-1) / (low * high))
 
 
 def _checked(quaternion, angular_velocity, torque, inertia):

@@ -61,8 +61,7 @@ class Policy:
         features: "state", the observation as it is, or "multiscale".
         hidden_sizes: neurons of each hidden layer.
         num_actions: number of actions.
-        rate_margin: actions that lead above this fraction of the rate limit are masked,
-            unless they slow the spacecraft down; 0: no mask.
+        rate_margin: the fraction of the rate limit that :func:`rate_mask` keeps; 0: no mask.
     """
 
     features: str = "state"
@@ -133,15 +132,18 @@ def multiscale_features(observation: chex.Array, control_period: chex.Array) -> 
 
 
 def rate_mask(observation: chex.Array, context: Context, margin: float) -> chex.Array:
-    """Which actions keep ‖ω‖ within ``margin`` times the rate limit, or do not raise it.
+    """Which actions keep the spacecraft within ``margin`` times the rate limit for good.
 
-    An action without torque is always allowed.
+    An action is allowed if the coasting motion after it never passes that rate, or if it
+    lowers the peak of a motion that does. Actions without torque are always allowed, so that
+    no state is without one. Hence no policy under the mask passes the limit from rest.
 
     Returns:
         (actions,) bool.
     """
     angular_velocity = observation[observations.ANGULAR_VELOCITY]
     after = dynamics.rate_after_impulse(angular_velocity, context.torque_table, context.inertia)
-    limit = jnp.maximum((margin * context.rate_limit) ** 2, jnp.sum(angular_velocity**2))
+    peak_before = dynamics.peak_rate(angular_velocity, context.inertia)
+    peak_after = dynamics.peak_rate(after, context.inertia)
     coasts = jnp.all(context.torque_table == 0, axis=-1)
-    return coasts | (jnp.sum(after**2, axis=-1) <= limit)
+    return coasts | (peak_after <= margin * context.rate_limit) | (peak_after < peak_before)

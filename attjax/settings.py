@@ -51,7 +51,7 @@ class Settings:
     )
     hidden_sizes: tuple[int, ...] = setting("neurons of each hidden layer (Table 3)", low=1)
     rate_margin: float = setting(
-        "mask actions that would lead above this fraction of the rate limit; 0: no mask",
+        "mask actions after which coasting would pass this fraction of the rate limit; 0: no mask",
         low=0,
         high=1,
     )

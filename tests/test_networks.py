@@ -3,7 +3,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, networks, observation
+from attjax import AttitudeEnv, dynamics, networks, observation, spacecraft
 from attjax.networks import Policy
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
@@ -38,20 +38,54 @@ def test_multiscale_features_resolve_every_decade():
         assert float(jnp.abs(a).max()) <= 3
 
 
-def test_mask_removes_exactly_the_actions_beyond_the_limit(x64):
+def test_mask_removes_exactly_the_actions_that_lead_beyond_the_limit(x64):
     rng = np.random.default_rng(0)
     context = ENV.context(ENV.default_params)
     table, inertia = np.asarray(context.torque_table), np.asarray(context.inertia)
+    middle = 0.797 * (0.872 + 0.115 - 0.797) / (0.872 * 0.115)
     limited = 0
     for _ in range(200):
         w = rng.normal(size=3)
         w *= rng.uniform(0.40, 0.52) / np.linalg.norm(w)
-        after = np.linalg.norm(w + table / inertia / 240, axis=1)
-        expected = (after <= max(0.45, np.linalg.norm(w))) | (np.arange(19) == 0)
+        before = np.sqrt(w**2 @ [1, 1, middle])
+        after = np.sqrt((w + table / inertia / 240) ** 2 @ [1, 1, middle])
+        expected = (after <= 0.45) | (after < before) | (np.arange(19) == 0)
         ours = networks.rate_mask(observe(w), context, 0.9)
         np.testing.assert_array_equal(ours, expected)
         limited += not expected.all()
     assert limited > 50
+
+
+@pytest.mark.parametrize("frameskip", [0, 5, 20])
+@pytest.mark.parametrize("reckless", [True, False], ids=["fastest", "random"])
+def test_no_policy_under_the_mask_passes_the_limit(frameskip, reckless):
+    """64 spacecraft that spin up as far as the mask lets them, or act at random."""
+    env, margin = AttitudeEnv(frameskip), 0.99
+    params = env.default_params
+    context = env.context(params)
+
+    def step(state, key):
+        observed = observation.observe(state.quaternion, state.angular_velocity)
+        allowed = networks.rate_mask(observed, context, margin)
+        wish = jax.random.uniform(key, (19,))
+        if reckless:
+            after = dynamics.rate_after_impulse(
+                state.angular_velocity, context.torque_table, context.inertia
+            )
+            wish = dynamics.peak_rate(after, context.inertia) + 1e-3 * wish
+        state = spacecraft.step(
+            state, jnp.argmax(jnp.where(allowed, wish, -1.0)), params, frameskip
+        )
+        return state, jnp.sqrt(jnp.sum(state.angular_velocity**2))
+
+    def highest_rate(key):
+        start = spacecraft.initial_state(key, params)
+        return jnp.max(jax.lax.scan(step, start, jax.random.split(key, 1750))[1])
+
+    rates = jax.jit(jax.vmap(highest_rate))(jax.random.split(jax.random.key(1), 64))
+    assert rates.max() <= margin * params.rate_limit * (1 + 1e-5)
+    if reckless:
+        assert rates.max() > 0.985 * params.rate_limit
 
 
 def test_masked_actions_are_never_taken():
