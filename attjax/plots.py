@@ -30,6 +30,7 @@ PULSES = (-0.5, -0.05, -0.005, 0, 0.005, 0.05, 0.5)
 STYLES = ("-", "--", "-.", ":")
 GOAL_DEG = 0.25
 RANDOM_SLEWS = 200
+FINAL_SECONDS = 8.0
 
 
 def _save(figure, folder: Path, name: str) -> Path:
@@ -85,6 +86,7 @@ def write_all(flight: Flight, folder: Path, metrics: Path | None) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     paths = [
         *slews(flight, folder),
+        final_seconds(flight, folder),
         error_histories(flight, folder),
         distributions(flight, folder),
         settling(flight, folder),
@@ -130,6 +132,25 @@ def _plot_pulses(axis, time, torque):
     axis.set_yticks(PULSES, [f"{pulse:g}" for pulse in PULSES])
     axis.set_ylim(-1.5, 1.5)
     axis.legend(loc="upper right", ncols=4, fontsize=8)
+
+
+def final_seconds(flight: Flight, folder: Path) -> Path:
+    """The end of Table 5's slews, magnified: how a controller holds its target."""
+    time, history = flight.record(_at_rest(list(TABLE_5.values())))
+    shown = time > time[-1] - FINAL_SECONDS
+    angles = _angles_deg(history.quaternion)[shown]
+    figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
+    for index, (marker, values) in enumerate(zip("o^s", angles.T)):
+        axis.plot(
+            time[shown], values, marker + "-", linewidth=1, markersize=3, label=f"test {index + 1}"
+        )
+    axis.axhline(GOAL_DEG, color="tab:red", linestyle="-.", linewidth=1, label="0.25°")
+    axis.set_ylim(0)
+    axis.set_xlabel("time (s)")
+    axis.set_ylabel("error angle φ (°)")
+    axis.set_title(f"Table 5, the last {FINAL_SECONDS:g} s, at {flight.hz}")
+    axis.legend(loc="upper right", ncols=4, fontsize=8)
+    return _save(figure, folder, "final_seconds")
 
 
 def error_histories(flight: Flight, folder: Path) -> Path:

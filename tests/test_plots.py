@@ -28,7 +28,7 @@ def test_every_figure_is_written(flight, tmp_path):
     names = {path.stem for path in written}
     assert names == {
         "slew1", "slew2", "slew3", "error_histories", "distributions", "settling",
-        "learning_curve",
+        "learning_curve", "final_seconds",
     }  # fmt: skip
     for path in written:
         pixels = plots.plt.imread(path)
