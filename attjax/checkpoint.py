@@ -19,7 +19,7 @@ from attjax.learner import Learner
 from attjax.progress import METRICS
 from attjax.settings import Settings
 
-FORMAT = 1
+FORMAT = 2
 CONFIG = "config.json"
 KEPT = 3
 

@@ -65,6 +65,14 @@ def optimizer(settings: Settings) -> optax.GradientTransformation:
     return optax.chain(clip, optax.adam(schedule))
 
 
+def entropy_coefficient(settings: Settings, update) -> chex.Array:
+    """Weight of the entropy bonus in an update, annealed linearly over the whole run."""
+    schedule = optax.linear_schedule(
+        settings.entropy_coefficient, settings.final_entropy_coefficient, settings.num_updates
+    )
+    return schedule(update)
+
+
 @functools.partial(jax.jit, static_argnames="setup")
 def init(setup: Setup, env_params: tuple, key: chex.PRNGKey) -> Learner:
     """A learner at its start. ``env_params`` holds one parameter set an environment."""

@@ -11,8 +11,11 @@ from attjax import dynamics
 from attjax import observation as observations
 from attjax.context import Context
 
-SCALES = tuple(8.0**n for n in range(6))
-"""Factors of the multi-scale inputs: 1 resolves the slew, 32,768 the last 1e-5 of it."""
+SCALES = tuple(4.0**n for n in range(9))
+"""Factors of the multi-scale inputs: 1 resolves the slew, 65,536 the last 1e-5 of it."""
+
+FEATURE_PERIOD = 0.05
+"""Control period to which the multi-scale inputs scale the attitude, s."""
 
 MASKED_LOGIT = -1e9
 
@@ -112,20 +115,24 @@ class Policy:
 
 
 def multiscale_features(observation: chex.Array, control_period: chex.Array) -> chex.Array:
-    """tanh(k x) of the quaternion's vector part and of ω for every k of SCALES.
+    """tanh(k x) of the attitude and of ω for every k of SCALES.
 
     Near the goal the state is 1e-5 of what it is at the start; each scale resolves its own
-    decades. q_s, the control period (in 0.1 s) and its logarithm are appended.
+    decades. The attitude is the quaternion's vector part times 0.05 s/control period: an
+    action changes ω by the same amount at every control rate, but in a longer period ω turns
+    the spacecraft farther. In these units, near the goal, the task is the same at all rates.
+    q_s, the control period (in 0.1 s) and its logarithm are appended.
 
     Args:
         observation: (11,) Eq. 11.
         control_period: scalar, s.
 
     Returns:
-        (39,) features.
+        (57,) features.
     """
     quaternion = observation[observations.QUATERNION]
-    state = jnp.concatenate([quaternion[:3], observation[observations.ANGULAR_VELOCITY]])
+    attitude = quaternion[:3] * (FEATURE_PERIOD / control_period)
+    state = jnp.concatenate([attitude, observation[observations.ANGULAR_VELOCITY]])
     scaled = jnp.tanh(jnp.array(SCALES, state.dtype)[:, None] * state)
     period = [quaternion[3], 10 * control_period, jnp.log(10 * control_period)]
     return jnp.concatenate([scaled.ravel(), jnp.stack(period)])

@@ -144,8 +144,7 @@ def final_seconds(flight: Flight, folder: Path) -> Path:
         axis.plot(
             time[shown], values, marker + "-", linewidth=1, markersize=3, label=f"test {index + 1}"
         )
-    axis.axhline(GOAL_DEG, color="tab:red", linestyle="-.", linewidth=1, label="0.25°")
-    axis.set_ylim(0)
+    axis.set_ylim(0, 1.2 * angles.max())
     axis.set_xlabel("time (s)")
     axis.set_ylabel("error angle φ (°)")
     axis.set_title(f"Table 5, the last {FINAL_SECONDS:g} s, at {flight.hz}")
@@ -204,7 +203,8 @@ def settling(flight: Flight, folder: Path) -> Path:
         (times, settled, "k-", "their mean"),
         (optimal, np.ones_like(settled), "k--", "time-optimal reference, mean"),
     ):
-        means = [np.mean(values[chosen & (bins == b)]) for b in range(12)]
+        binned = [values[chosen & (bins == b)] for b in range(12)]
+        means = [np.mean(x) if len(x) else np.nan for x in binned]
         axis.plot(middle, means, style, label=label)
     axis.set_xlabel("slew angle (°)")
     axis.set_ylabel("settling time to 0.25° (s)")

@@ -13,7 +13,7 @@ import optax
 from flax import struct
 
 from attjax import losses
-from attjax.learner import Learner, Setup, optimizer
+from attjax.learner import Learner, Setup, entropy_coefficient, optimizer
 from attjax.networks import Inputs
 from attjax.rollout import Step, encode, episode_sums, pick, rollout
 
@@ -127,10 +127,13 @@ def optimize(setup, learner, samples: Sample) -> tuple[Learner, dict]:
     settings = setup.settings
     transformation = optimizer(settings)
     used = settings.minibatches * settings.minibatch_size
+    entropy_weight = entropy_coefficient(settings, learner.update)
 
     def gradient_step(carry, sample):
         params, state = carry
-        gradients, metrics = jax.grad(loss, argnums=1, has_aux=True)(setup, params, sample)
+        gradients, metrics = jax.grad(loss, argnums=1, has_aux=True)(
+            setup, params, sample, entropy_weight
+        )
         new = {n: transformation.update(gradients[n], state[n], params[n]) for n in params}
         params = {n: optax.apply_updates(params[n], new[n][0]) for n in params}
         return (params, {n: new[n][1] for n in params}), metrics
@@ -152,7 +155,9 @@ def optimize(setup, learner, samples: Sample) -> tuple[Learner, dict]:
     return learner, jax.tree.map(jnp.mean, metrics)
 
 
-def loss(setup: Setup, params: dict, sample: Sample) -> tuple[chex.Array, dict[str, Any]]:
+def loss(
+    setup: Setup, params: dict, sample: Sample, entropy_weight
+) -> tuple[chex.Array, dict[str, Any]]:
     """Clipped objective with entropy bonus plus the value's mean squared error.
 
     The two networks share no parameters, so the sum trains each on its own loss.
@@ -175,7 +180,7 @@ def loss(setup: Setup, params: dict, sample: Sample) -> tuple[chex.Array, dict[s
         "explained_variance": 1 - jnp.var(residual) / (jnp.var(sample.target) + 1e-12),
         **diagnostics,
     }
-    return policy_loss - settings.entropy_coefficient * entropy + value_loss, metrics
+    return policy_loss - entropy_weight * entropy + value_loss, metrics
 
 
 def _all_finite(tree):

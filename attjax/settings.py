@@ -46,7 +46,7 @@ class Settings:
 
     # The networks
     features: str = setting(
-        "network inputs: Eq. 11 as it is, or tanh(k x) of attitude and rate at six scales",
+        "network inputs: Eq. 11 as it is, or tanh(k x) of attitude and rate at nine scales",
         choices=("state", "multiscale"),
     )
     hidden_sizes: tuple[int, ...] = setting("neurons of each hidden layer (Table 3)", low=1)
@@ -68,7 +68,8 @@ class Settings:
     )
     gae_lambda: float = setting("GAE's lambda; 1 is Eq. 5", low=0, high=1)
     clip: float = setting("clipping parameter (epsilon, Eq. 4)", above=0, below=1)
-    entropy_coefficient: float = setting("weight of the entropy bonus (c)", low=0)
+    entropy_coefficient: float = setting("weight of the entropy bonus (c) at the start", low=0)
+    final_entropy_coefficient: float = setting("and at the end; linear in between", low=0)
     learning_rate: float = setting("Adam's learning rate at the start", above=0)
     final_learning_rate: float = setting("and at the end; linear in between", low=0)
     normalize_advantage: bool = setting("standardise the advantages of each minibatch")

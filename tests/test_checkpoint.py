@@ -118,7 +118,7 @@ def edited(tmp_path, **changes):
     "changes, message",
     [
         ({"program": "other"}, "another program"),
-        ({"format": 2}, "format 2"),
+        ({"format": 3}, "format 3"),
         ({"settings": {}}, "unknown or missing"),
         ({"seed": None}, "cannot be read"),
     ],
