@@ -105,6 +105,11 @@ def angular_momentum(inertia, angular_velocity):
     return jnp.matmul(angular_velocity, inertia, precision="highest")
 
 
+def principal_moments(inertia):
+    """(3,) principal moments, kg m², of an inertia (3,) or (3, 3)."""
+    return inertia if inertia.ndim == 1 else jnp.linalg.eigvalsh(inertia)
+
+
 def peak_rate(angular_velocity, inertia):
     """Largest ‖ω‖ that the spacecraft comes to while it coasts on without torque.
 
@@ -123,7 +128,7 @@ def peak_rate(angular_velocity, inertia):
         >>> round(peak_rate(jnp.array([0.0, 0.0, 0.4]), jnp.array(LM50_INERTIA)).item(), 4)
         0.4915
     """
-    moments = inertia if inertia.ndim == 1 else jnp.linalg.eigvalsh(inertia)
+    moments = principal_moments(inertia)
     low, high = jnp.min(moments), jnp.max(moments)
     momentum = angular_momentum(inertia, angular_velocity)
     complement = (low + high) * angular_velocity - momentum

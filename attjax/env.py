@@ -140,9 +140,7 @@ class AttitudeEnv:
 
         Coasting can raise ‖ω‖ at constant energy by at most √(I_max/I_min).
         """
-        moments = params.inertia
-        if moments.ndim == 2:
-            moments = jnp.linalg.eigvalsh(moments)
+        moments = dynamics.principal_moments(params.inertia)
         kick = jnp.max(jnp.abs(params.torque_table)) * dynamics.INTEGRATION_STEP / jnp.min(moments)
         rate = (params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))
         one = jnp.ones_like(rate)

@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import functools
 from pathlib import Path
 
 import jax
@@ -74,6 +75,11 @@ class Flight:
         key, episodes = jax.random.key(self.seed), len(self.flown.overspeed)
         return evaluation.random_slews(self.env, self.params, key, episodes)[1]
 
+    @functools.cached_property
+    def table_5(self):
+        """Time and history of Table 5's slews, which two figures show."""
+        return self.record(_at_rest(list(TABLE_5.values())))
+
     def record(self, start: EnvState):
         """Time in s, (steps,), and the history of slews from the given states."""
         steps = int(self.params.max_steps_in_episode)
@@ -98,7 +104,7 @@ def write_all(flight: Flight, folder: Path, metrics: Path | None) -> list[Path]:
 
 def slews(flight: Flight, folder: Path) -> list[Path]:
     """What the paper's Figs. 5–7 show, of Table 5's slews, and the torques chosen."""
-    time, history = flight.record(_at_rest(list(TABLE_5.values())))
+    time, history = flight.table_5
     paths = []
     for index, name in enumerate(TABLE_5):
         one = jax.tree.map(lambda x, index=index: np.asarray(x[:, index]), history)
@@ -136,7 +142,7 @@ def _plot_pulses(axis, time, torque):
 
 def final_seconds(flight: Flight, folder: Path) -> Path:
     """The end of Table 5's slews, magnified: how a controller holds its target."""
-    time, history = flight.record(_at_rest(list(TABLE_5.values())))
+    time, history = flight.table_5
     shown = time > time[-1] - FINAL_SECONDS
     angles = _angles_deg(history.quaternion)[shown]
     figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
