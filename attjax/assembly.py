@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 
-from attjax import learner
+from attjax import learner, spacecraft
 from attjax.env import AttitudeEnv
 from attjax.networks import Policy
 from attjax.reward import REWARDS
@@ -22,7 +22,10 @@ def policy(settings: Settings) -> Policy:
 def setup(settings: Settings) -> learner.Setup:
     """Environments, policy and settings of a training run."""
     reward = REWARDS[settings.reward]
-    envs = tuple(AttitudeEnv(frameskip, reward) for frameskip in settings.frameskips)
+    start = spacecraft.initial_state
+    if settings.near_goal_share > 0:
+        start = spacecraft.NearGoalStarts(settings.near_goal_share, settings.near_goal_steps)
+    envs = tuple(AttitudeEnv(frameskip, reward, start) for frameskip in settings.frameskips)
     return learner.Setup(envs, policy(settings), settings)
 
 

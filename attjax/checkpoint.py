@@ -19,7 +19,7 @@ from attjax.learner import Learner
 from attjax.progress import METRICS
 from attjax.settings import Settings
 
-FORMAT = 2
+FORMAT = 3
 CONFIG = "config.json"
 KEPT = 3
 

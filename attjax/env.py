@@ -22,6 +22,7 @@ class AttitudeEnv:
     Attributes:
         frameskip: torque-free RK4 steps in an agent step: 20 is 11.43 Hz, 5 is 40 Hz.
         reward: function of a :class:`attjax.reward.Transition`.
+        initial_state: function of a key and parameters that draws the start of an episode.
 
     Raises:
         ValueError: frameskip is not an integer from 0 to 10,499.
@@ -35,6 +36,7 @@ class AttitudeEnv:
 
     frameskip: int = 20
     reward: Callable[[Transition], chex.Array] = paper_reward
+    initial_state: Callable[[chex.PRNGKey, EnvParams], EnvState] = spacecraft.initial_state
 
     def __post_init__(self):
         valid = isinstance(self.frameskip, int) and 0 <= self.frameskip < EPISODE_RK4_STEPS
@@ -68,7 +70,7 @@ class AttitudeEnv:
 
     def reset(self, key: chex.PRNGKey, params: EnvParams | None = None):
         """Start an episode. Returns the observation (11,) and the state."""
-        state = spacecraft.initial_state(key, self.default_params if params is None else params)
+        state = self.initial_state(key, self.default_params if params is None else params)
         return observations.observe(state.quaternion, state.angular_velocity), state
 
     reset_env = reset

@@ -40,6 +40,8 @@ class Learner:
         env_states: batched states, one pytree an environment.
         observation: (num_envs, size) current observations.
         score: (num_envs,) sum of ``info["score"]`` over the current episodes.
+        is_whole: (num_envs,) whether the current episodes started at time 0; only these count
+            in the metrics.
         key: typed random key.
         update: updates done, int32.
     """
@@ -49,6 +51,7 @@ class Learner:
     env_states: tuple
     observation: chex.Array
     score: chex.Array
+    is_whole: chex.Array
     key: chex.PRNGKey
     update: chex.Array
 
@@ -84,7 +87,7 @@ def init(setup: Setup, env_params: tuple, key: chex.PRNGKey) -> Learner:
         if setup.settings.stagger_episodes:
             key_, shape = jax.random.fold_in(time_key, group.start), state.time.shape
             time = jax.random.randint(key_, shape, 0, params.max_steps_in_episode)
-            state = state.replace(time=time)
+            state = state.replace(time=jnp.maximum(state.time, time))
         observations.append(observation)
         states.append(state)
     observation = jnp.concatenate(observations)
@@ -96,6 +99,12 @@ def init(setup: Setup, env_params: tuple, key: chex.PRNGKey) -> Learner:
         env_states=tuple(states),
         observation=observation,
         score=jnp.zeros(setup.settings.num_envs, observation.dtype),
+        is_whole=episodes_at_start(states),
         key=key,
         update=jnp.zeros((), jnp.int32),
     )
+
+
+def episodes_at_start(states) -> chex.Array:
+    """(num_envs,) whether each spacecraft of the environments' states is at time 0."""
+    return jnp.concatenate([state.time for state in states]) == 0

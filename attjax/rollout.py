@@ -3,9 +3,10 @@
 import chex
 import jax
 import jax.numpy as jnp
+import numpy as np
 from flax import struct
 
-from attjax.learner import Learner
+from attjax.learner import Learner, episodes_at_start
 from attjax.networks import Inputs
 
 
@@ -21,18 +22,26 @@ class Step:
     truncated: chex.Array
     final_observation: chex.Array
     score: chex.Array
+    is_whole: chex.Array
     outcome: dict[str, chex.Array]
 
 
 def rollout(setup, env_params, contexts, learner) -> tuple[Learner, Step]:
-    """``rollout_length`` steps of all spacecraft under the current policy."""
+    """``rollout_length`` steps of all spacecraft under the current policy.
+
+    Most sample their actions. Those of :func:`greedy_rows` take the most probable one, as in
+    flight, so that the learner meets what only the greedy policy does, such as standing still
+    where several actions are about equally good. Their advantages then lower that action.
+    """
     policy, num_envs = setup.policy, setup.settings.num_envs
+    greedy = greedy_rows(setup.settings)
 
     def step(learner, _):
         key, action_key, step_key = jax.random.split(learner.key, 3)
         inputs = encode(setup, contexts, learner.observation)
         log_probabilities = policy.log_probabilities(learner.params, inputs)
-        action = jax.random.categorical(action_key, log_probabilities)
+        sampled = jax.random.categorical(action_key, log_probabilities)
+        action = jnp.where(greedy, jnp.argmax(log_probabilities, axis=-1), sampled)
         results = [
             jax.vmap(env.step, (0, 0, 0, None))(keys, state, action_, params)
             for env, keys, state, action_, params in zip(
@@ -55,17 +64,26 @@ def rollout(setup, env_params, contexts, learner) -> tuple[Learner, Step]:
             truncated=truncated,
             final_observation=info["final_observation"],
             score=score,
+            is_whole=learner.is_whole,
             outcome=info["outcome"],
         )
+        ended = terminated | truncated
         learner = learner.replace(
             env_states=env_states,
             observation=jnp.concatenate(observations),
-            score=jnp.where(terminated | truncated, 0.0, score),
+            score=jnp.where(ended, 0.0, score),
+            is_whole=jnp.where(ended, episodes_at_start(env_states), learner.is_whole),
             key=key,
         )
         return learner, step
 
     return jax.lax.scan(step, learner, length=setup.settings.rollout_length)
+
+
+def greedy_rows(settings) -> np.ndarray:
+    """(num_envs,) bool, which spacecraft act greedily: ``greedy_share`` of them, spread evenly."""
+    count_before = np.floor(np.arange(settings.num_envs + 1) * settings.greedy_share)
+    return np.diff(count_before) > 0
 
 
 def encode(setup, contexts, observation) -> Inputs:
@@ -77,8 +95,9 @@ def encode(setup, contexts, observation) -> Inputs:
 
 
 def episode_sums(setup, steps: Step) -> dict[str, chex.Array]:
-    """Sums over the episodes that ended in a rollout, one an environment."""
-    ended = (steps.terminated | steps.truncated).astype(steps.score.dtype)
+    """Sums over the whole episodes that ended in a rollout, one an environment."""
+    ended = steps.is_whole & (steps.terminated | steps.truncated)
+    ended = ended.astype(steps.score.dtype)
     columns = {
         "episodes": ended,
         "score": ended * steps.score,

@@ -40,6 +40,12 @@ class Settings:
     max_episode_steps: int = setting(
         "cap on an episode's agent steps in training, beside its 43.75 s", low=1
     )
+    near_goal_share: float = setting(
+        "share of the training episodes that start near the goal, at any scale, and are short",
+        low=0,
+        below=1,
+    )
+    near_goal_steps: int = setting("agent steps of such an episode", low=1)
     stagger_episodes: bool = setting(
         "start the first episodes at random times, so that they do not end all at once"
     )
@@ -59,6 +65,11 @@ class Settings:
     # PPO
     total_steps: int = setting("agent steps in the whole run, rounded up to whole updates", low=1)
     num_envs: int = setting("spacecraft simulated side by side", low=1)
+    greedy_share: float = setting(
+        "share of the spacecraft that act greedily, as in flight, while the others explore",
+        low=0,
+        below=1,
+    )
     rollout_length: int = setting("agent steps of each spacecraft between two updates", low=1)
     passes: int = setting("passes over the data of an update (N)", low=1)
     minibatch_size: int = setting("samples in a gradient step", low=1)

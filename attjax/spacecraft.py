@@ -1,5 +1,7 @@
 """One spacecraft: its state, its parameters (Table 1, section 2.3) and the agent step."""
 
+import dataclasses
+
 import chex
 import jax
 import jax.numpy as jnp
@@ -77,15 +79,51 @@ def default_params(frameskip: int = 20) -> EnvParams:
 def initial_state(key: chex.PRNGKey, params: EnvParams) -> EnvState:
     """A spacecraft at rest, turned by a uniform angle about a uniformly distributed axis."""
     u = jax.random.uniform(key, (3,), params.inertia.dtype)
-    cosine, azimuth = 2 * u[0] - 1, 2 * jnp.pi * u[1]
-    sine = jnp.sqrt(1 - cosine**2)
-    axis = jnp.stack([sine * jnp.cos(azimuth), sine * jnp.sin(azimuth), cosine])
+    axis = _direction(u[:2])
     angle = params.min_slew_angle + u[2] * (params.max_slew_angle - params.min_slew_angle)
     return EnvState(
         quaternion=quaternions.from_axis_angle(axis, angle),
         angular_velocity=jnp.zeros_like(axis),
         time=jnp.zeros((), jnp.int32),
     )
+
+
+@dataclasses.dataclass(frozen=True)
+class NearGoalStarts:
+    """Initial states for training: some episodes start near the goal, moving, and end soon.
+
+    Angle and rate of those are log-uniform, down to 1e-6 rad and 2.5e-6 rad/s, in random
+    directions. So the learner practises the last decades from the first update on, not only
+    once it can steer there. They start late in the episode, ``steps`` before the time limit,
+    and never at time 0, which marks whole episodes.
+
+    Attributes:
+        share: of the episodes that start near the goal; the others are as the paper's.
+        steps: agent steps that such an episode lasts.
+    """
+
+    share: float
+    steps: int
+
+    def __call__(self, key: chex.PRNGKey, params: EnvParams) -> EnvState:
+        """Draw one; the signature of :func:`initial_state`."""
+        slew_key, key = jax.random.split(key)
+        u = jax.random.uniform(key, (7,), params.inertia.dtype)
+        angle, rate = 10.0 ** (-6 * u[0]), 0.5 * params.rate_limit * 10.0 ** (-5 * u[1])
+        near = EnvState(
+            quaternion=quaternions.from_axis_angle(_direction(u[2:4]), angle),
+            angular_velocity=rate * _direction(u[4:6]),
+            time=jnp.maximum(params.max_steps_in_episode - self.steps, 1),
+        )
+        slew = initial_state(slew_key, params)
+        return jax.tree.map(lambda a, b: jnp.where(u[6] < self.share, a, b), near, slew)
+
+
+def _direction(u):
+    """A uniformly distributed unit vector (3,) from two uniform numbers."""
+    cosine, azimuth = 2 * u[0] - 1, 2 * jnp.pi * u[1]
+    sine = jnp.sqrt(1 - cosine**2)
+    return jnp.stack([sine * jnp.cos(azimuth), sine * jnp.sin(azimuth), cosine])
 
 
 def step(state: EnvState, action, params: EnvParams | None = None, frameskip: int = 20) -> EnvState:

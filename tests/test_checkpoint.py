@@ -118,7 +118,7 @@ def edited(tmp_path, **changes):
     "changes, message",
     [
         ({"program": "other"}, "another program"),
-        ({"format": 3}, "format 3"),
+        ({"format": 99}, "format 99"),
         ({"settings": {}}, "unknown or missing"),
         ({"seed": None}, "cannot be read"),
     ],

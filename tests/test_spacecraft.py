@@ -50,6 +50,33 @@ def test_initial_slews_are_uniform_in_angle_and_axis():
     assert np.abs(np.corrcoef(degrees, axes.T)[0, 1:]).max() < 5 / np.sqrt(n)
 
 
+def test_near_goal_starts_cover_every_decade_of_angle_and_rate():
+    n = 100_000
+    params = spacecraft.default_params()
+    starts = spacecraft.NearGoalStarts(share=0.75, steps=64)
+    drawn = jax.vmap(starts, (0, None))(jax.random.split(jax.random.key(0), n), params)
+    near = np.asarray(drawn.time) == 500 - 64
+    assert near.mean() == pytest.approx(0.75, abs=5 * np.sqrt(0.75 * 0.25 / n))
+    angle = np.asarray(jax.vmap(quaternions.error_angle)(drawn.quaternion))
+    rate = np.linalg.norm(drawn.angular_velocity, axis=1)
+    # log10 is uniform: from −6 to 0 of the angle, from −5 to 0 of the rate over half its limit.
+    for x, decades in ((angle[near], 6), (rate[near] / 0.25, 5)):
+        counts, _ = np.histogram(np.log10(x), np.linspace(-decades, 0, decades + 1))
+        expected = near.sum() / decades
+        np.testing.assert_allclose(counts, expected, atol=5 * np.sqrt(expected))
+    assert abs(np.corrcoef(np.log(angle[near]), np.log(rate[near]))[0, 1]) < 5 / np.sqrt(n)
+    # The others are the paper's.
+    assert np.all(drawn.time[~near] == 0) and np.all(rate[~near] == 0)
+    assert np.rad2deg(angle[~near].min()) > 29.9 and np.rad2deg(angle[~near].mean()) > 89
+
+
+def test_near_goal_starts_never_mark_a_whole_episode():
+    params = spacecraft.default_params().replace(max_steps_in_episode=jnp.int32(10))
+    starts = spacecraft.NearGoalStarts(share=0.999, steps=64)
+    times = jax.vmap(starts, (0, None))(jax.random.split(jax.random.key(0), 50), params).time
+    assert set(times.tolist()) == {1}
+
+
 @pytest.mark.parametrize("frameskip, steps", [(20, 500), (5, 1750), (7, 1312), (0, 10_500)])
 def test_episodes_last_43_75_seconds(frameskip, steps):
     assert spacecraft.default_params(frameskip).max_steps_in_episode == steps
