@@ -238,5 +238,5 @@ def learning_curve(metrics: Path, folder: Path) -> Path:
     axes[0].legend()
     axes[2].set_yscale("log")
     axes[2].set_xlabel("agent steps (millions)")
-    axes[0].set_title("Learning, exploring policy")
+    axes[0].set_title("Learning: training episodes")
     return _save(figure, folder, "learning_curve")
