@@ -31,7 +31,8 @@ def rollout(setup, env_params, contexts, learner) -> tuple[Learner, Step]:
 
     Most sample their actions. Those of :func:`greedy_rows` take the most probable one, as in
     flight, so that the learner meets what only the greedy policy does, such as standing still
-    where several actions are about equally good. Their advantages then lower that action.
+    where several actions are about equally probable. The advantage is negative there, and the
+    update lowers the action. It takes these steps as if they had been sampled.
     """
     policy, num_envs = setup.policy, setup.settings.num_envs
     greedy = greedy_rows(setup.settings)
