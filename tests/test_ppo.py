@@ -1,31 +1,12 @@
-import dataclasses
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from probes import Probe
+from setups import settings, small_attitude_setup
 
 from attjax import assembly, learner, ppo, presets
 from attjax.networks import Policy
-from attjax.rollout import episode_sums, greedy_rows, rollout
-
-SMALL = {
-    "num_envs": 64,
-    "rollout_length": 16,
-    "minibatch_size": 128,
-    "hidden_sizes": (32, 32),
-    "reward_scale": 1.0,
-    "learning_rate": 3e-3,
-    "final_learning_rate": 3e-4,
-    "updates_per_block": 1,
-}
-
-
-def settings(updates, preset=presets.PAPER_FAST, **overrides):
-    values = SMALL | overrides
-    steps = values["num_envs"] * values["rollout_length"] * updates
-    return dataclasses.replace(preset, total_steps=steps, **values)
 
 
 def train(setup, seed=0):
@@ -85,11 +66,6 @@ def test_value_bootstraps_at_the_time_limit_where_asked():
 def test_value_does_not_bootstrap_over_a_termination():
     value, _ = train_probe(Probe("constant", length=3), discount=0.8, time_limit_terminates=False)
     assert value(1, 2 / 3) == pytest.approx(1, abs=0.1)
-
-
-def small_attitude_setup(updates, preset=presets.PRECISE, **overrides):
-    overrides = {"frameskips": (5, 20)} | overrides
-    return assembly.setup(settings(updates, preset, **overrides))
 
 
 def test_a_short_training_improves_the_return():
@@ -170,84 +146,6 @@ def test_entropy_bonus_is_what_its_weight_takes_off_the_loss():
     rewarded, _ = ppo.loss(setup, params, sample, 0.5)
     assert metrics["entropy"] == pytest.approx(np.log(19), rel=1e-2)
     assert plain - rewarded == pytest.approx(0.5 * float(metrics["entropy"]), rel=1e-5)
-
-
-def test_spacecraft_are_shared_out_among_the_control_rates():
-    setup = small_attitude_setup(1, frameskips=(5, 7, 10, 14, 20))
-    sizes = [group.stop - group.start for group in setup.slices]
-    assert sum(sizes) == 64 and set(sizes) == {12, 13}
-    assert [env.frameskip for env in setup.envs] == [5, 7, 10, 14, 20]
-    env_params = assembly.env_params(setup)
-    contexts = [env.context(p) for env, p in zip(setup.envs, env_params)]
-    discounts = ppo.discounts(setup, contexts)
-    for env, group in zip(setup.envs, setup.slices):
-        expected = 0.995 ** (env.control_period / 0.025)
-        np.testing.assert_allclose(discounts[group], expected, rtol=1e-6)
-        features = setup.policy.encode(jnp.zeros(11), env.context(env.default_params)).features
-        assert float(features[-2]) == pytest.approx(10 * env.control_period)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.125])
-def test_a_share_of_the_spacecraft_acts_greedily(share):
-    setup = small_attitude_setup(1, greedy_share=share)
-    env_params = assembly.env_params(setup)
-    state = learner.init(setup, env_params, jax.random.key(0))
-    contexts = [env.context(params) for env, params in zip(setup.envs, env_params)]
-    _, steps = rollout(setup, env_params, contexts, state)
-    log_probabilities = setup.policy.log_probabilities(state.params, steps.inputs)
-    is_most_probable = steps.action == jnp.argmax(log_probabilities, axis=-1)
-    greedy = greedy_rows(setup.settings)
-    assert [greedy[group].sum() for group in setup.slices] == [32 * share, 32 * share]
-    assert is_most_probable[:, greedy].all()
-    # An untrained policy is close to uniform over 19 actions.
-    assert is_most_probable[:, ~greedy].mean() < 0.2
-    chosen = jnp.take_along_axis(log_probabilities, steps.action[..., None], axis=-1)[..., 0]
-    np.testing.assert_allclose(steps.log_probability, chosen, rtol=1e-5)
-
-
-def test_only_whole_episodes_count_in_the_metrics():
-    setup = small_attitude_setup(
-        1,
-        frameskips=(20,),
-        rollout_length=40,
-        max_episode_steps=10,
-        near_goal_share=0.5,
-        near_goal_steps=3,
-        stagger_episodes=False,
-    )
-    env_params = assembly.env_params(setup)
-    state = learner.init(setup, env_params, jax.random.key(0))
-    _, steps = rollout(setup, env_params, [env.context(env_params[0]) for env in setup.envs], state)
-    assert not steps.terminated.any()
-    ends = [np.flatnonzero(column) for column in np.asarray(steps.truncated).T]
-    lengths = np.concatenate([np.diff(rows, prepend=-1) for rows in ends])
-    assert set(lengths.tolist()) == {3, 10}
-    sums = episode_sums(setup, steps)
-    assert sums["episodes"] == (lengths == 10).sum()
-    whole = steps.truncated & steps.is_whole
-    assert sums["terminal_error_deg"] == pytest.approx(
-        float(jnp.sum(whole * steps.outcome["terminal_error_deg"])), rel=1e-5
-    )
-
-
-def test_training_episodes_are_capped_in_agent_steps():
-    """The slow rates keep their 43.75 s, the fast ones are cut; the paper's are untouched."""
-    setup = small_attitude_setup(1, frameskips=(5, 7, 10, 14, 20), max_episode_steps=700)
-    limits = [int(params.max_steps_in_episode) for params in assembly.env_params(setup)]
-    assert limits == [700, 700, 700, 700, 500]
-    paper = assembly.setup(presets.PAPER)
-    assert [int(p.max_steps_in_episode) for p in assembly.env_params(paper)] == [500]
-
-
-def test_staggered_episodes_start_at_random_times():
-    staggered = small_attitude_setup(1, near_goal_share=0.0)
-    env_params = assembly.env_params(staggered)
-    times = learner.init(staggered, env_params, jax.random.key(0)).env_states[0].time
-    assert len(set(times.tolist())) > 5 and int(times.max()) < 700
-    together = dataclasses.replace(
-        staggered, settings=dataclasses.replace(staggered.settings, stagger_episodes=False)
-    )
-    assert not learner.init(together, env_params, jax.random.key(0)).env_states[0].time.any()
 
 
 @pytest.mark.parametrize("spoiled", ["observations", "parameters"])

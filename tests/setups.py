@@ -1,0 +1,27 @@
+"""Small training setups that several test files share."""
+
+import dataclasses
+
+from attjax import assembly, presets
+
+SMALL = {
+    "num_envs": 64,
+    "rollout_length": 16,
+    "minibatch_size": 128,
+    "hidden_sizes": (32, 32),
+    "reward_scale": 1.0,
+    "learning_rate": 3e-3,
+    "final_learning_rate": 3e-4,
+    "updates_per_block": 1,
+}
+
+
+def settings(updates, preset=presets.PAPER_FAST, **overrides):
+    values = SMALL | overrides
+    steps = values["num_envs"] * values["rollout_length"] * updates
+    return dataclasses.replace(preset, total_steps=steps, **values)
+
+
+def small_attitude_setup(updates, preset=presets.PRECISE, **overrides):
+    overrides = {"frameskips": (5, 20)} | overrides
+    return assembly.setup(settings(updates, preset, **overrides))

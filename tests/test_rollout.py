@@ -1,0 +1,90 @@
+"""How spacecraft start, act and are counted in training."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from setups import small_attitude_setup
+
+from attjax import assembly, learner, ppo, presets
+from attjax.rollout import episode_sums, greedy_rows, rollout
+
+
+def test_spacecraft_are_shared_out_among_the_control_rates():
+    setup = small_attitude_setup(1, frameskips=(5, 7, 10, 14, 20))
+    sizes = [group.stop - group.start for group in setup.slices]
+    assert sum(sizes) == 64 and set(sizes) == {12, 13}
+    assert [env.frameskip for env in setup.envs] == [5, 7, 10, 14, 20]
+    env_params = assembly.env_params(setup)
+    contexts = [env.context(p) for env, p in zip(setup.envs, env_params)]
+    discounts = ppo.discounts(setup, contexts)
+    for env, group in zip(setup.envs, setup.slices):
+        expected = 0.995 ** (env.control_period / 0.025)
+        np.testing.assert_allclose(discounts[group], expected, rtol=1e-6)
+        features = setup.policy.encode(jnp.zeros(11), env.context(env.default_params)).features
+        assert float(features[-2]) == pytest.approx(10 * env.control_period)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.125])
+def test_a_share_of_the_spacecraft_acts_greedily(share):
+    setup = small_attitude_setup(1, greedy_share=share)
+    env_params = assembly.env_params(setup)
+    state = learner.init(setup, env_params, jax.random.key(0))
+    contexts = [env.context(params) for env, params in zip(setup.envs, env_params)]
+    _, steps = rollout(setup, env_params, contexts, state)
+    log_probabilities = setup.policy.log_probabilities(state.params, steps.inputs)
+    is_most_probable = steps.action == jnp.argmax(log_probabilities, axis=-1)
+    greedy = greedy_rows(setup.settings)
+    assert [greedy[group].sum() for group in setup.slices] == [32 * share, 32 * share]
+    assert is_most_probable[:, greedy].all()
+    # An untrained policy is close to uniform over 19 actions.
+    assert is_most_probable[:, ~greedy].mean() < 0.2
+    chosen = jnp.take_along_axis(log_probabilities, steps.action[..., None], axis=-1)[..., 0]
+    np.testing.assert_allclose(steps.log_probability, chosen, rtol=1e-5)
+
+
+def test_only_whole_episodes_count_in_the_metrics():
+    setup = small_attitude_setup(
+        1,
+        frameskips=(20,),
+        rollout_length=40,
+        max_episode_steps=10,
+        near_goal_share=0.5,
+        near_goal_steps=3,
+        stagger_episodes=False,
+    )
+    env_params = assembly.env_params(setup)
+    state = learner.init(setup, env_params, jax.random.key(0))
+    _, steps = rollout(setup, env_params, [env.context(env_params[0]) for env in setup.envs], state)
+    assert not steps.terminated.any()
+    ends = [np.flatnonzero(column) for column in np.asarray(steps.truncated).T]
+    lengths = np.concatenate([np.diff(rows, prepend=-1) for rows in ends])
+    assert set(lengths.tolist()) == {3, 10}
+    sums = episode_sums(setup, steps)
+    assert sums["episodes"] == (lengths == 10).sum()
+    whole = steps.truncated & steps.is_whole
+    assert sums["terminal_error_deg"] == pytest.approx(
+        float(jnp.sum(whole * steps.outcome["terminal_error_deg"])), rel=1e-5
+    )
+
+
+def test_training_episodes_are_capped_in_agent_steps():
+    """The slow rates keep their 43.75 s, the fast ones are cut; the paper's are untouched."""
+    setup = small_attitude_setup(1, frameskips=(5, 7, 10, 14, 20), max_episode_steps=700)
+    limits = [int(params.max_steps_in_episode) for params in assembly.env_params(setup)]
+    assert limits == [700, 700, 700, 700, 500]
+    paper = assembly.setup(presets.PAPER)
+    assert [int(p.max_steps_in_episode) for p in assembly.env_params(paper)] == [500]
+
+
+def test_staggered_episodes_start_at_random_times():
+    staggered = small_attitude_setup(1, near_goal_share=0.0)
+    env_params = assembly.env_params(staggered)
+    times = learner.init(staggered, env_params, jax.random.key(0)).env_states[0].time
+    assert len(set(times.tolist())) > 5 and int(times.max()) < 700
+    together = dataclasses.replace(
+        staggered, settings=dataclasses.replace(staggered.settings, stagger_episodes=False)
+    )
+    assert not learner.init(together, env_params, jax.random.key(0)).env_states[0].time.any()
