@@ -5,14 +5,26 @@ becomes an array over the batch, which XLA vectorises several times better than 
 fastest axis has length 3 or 4.
 """
 
+import functools
+
 import chex
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from attjax import quaternion as quaternions
+from attjax.kernel import one_loop
 
 INTEGRATION_STEP = 1 / 240
 """Length of one RK4 step, s (paper, section 2.3)."""
+
+PRODUCTS = ((1, 2), (2, 0), (0, 1), (0, 0), (1, 1), (2, 2))
+"""The products ωⱼ ωₖ of which the gyroscopic acceleration is made."""
+
+_LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)).transpose(2, 0, 1)
+
+STEPS_IN_LINE = 20
+"""Torque-free RK4 steps compiled for CPU one after another before there is a loop over them."""
 
 LM50_INERTIA = (0.872, 0.115, 0.797)
 """Principal moments of inertia of the LM50 bus, kg m²."""
@@ -44,8 +56,8 @@ def rk4_step(quaternion, angular_velocity, torque, inertia, dt=INTEGRATION_STEP)
         quaternion, angular_velocity, torque, inertia
     )
     state = (*quaternion, *angular_velocity)
-    increment = _rk4_increment(state, tuple(torque), _inertia_components(inertia), dt)
-    state = _add(state, increment)
+    gyroscopic, acceleration = _euler_terms(inertia, torque)
+    state = _add(state, _rk4_increment(state, gyroscopic, acceleration, dt))
     return jnp.stack(state[:4]), jnp.stack(state[4:])
 
 
@@ -66,17 +78,9 @@ def propagate(quaternion, angular_velocity, torque, inertia, frameskip):
     quaternion, angular_velocity, torque, inertia = _checked(
         quaternion, angular_velocity, torque, inertia
     )
-    inertia = _inertia_components(inertia)
-    no_torque = (jnp.zeros_like(torque[0]),) * 3
-
+    gyroscopic, acceleration = _euler_terms(inertia, torque)
     start = (*quaternion, *angular_velocity)
-
-    def free_step(change, _):
-        increment = _rk4_increment(_add(start, change), no_torque, inertia, INTEGRATION_STEP)
-        return _add(change, increment), None
-
-    change = _rk4_increment(start, tuple(torque), inertia, INTEGRATION_STEP)
-    change, _ = jax.lax.scan(free_step, change, length=frameskip)
+    change = _change(frameskip, start, acceleration, gyroscopic)
     state = _add(start, change)
     return quaternions.normalize(jnp.stack(state[:4])), jnp.stack(state[4:])
 
@@ -142,11 +146,21 @@ def _checked(quaternion, angular_velocity, torque, inertia):
     return arrays
 
 
-def _inertia_components(inertia):
-    """The inertia and its inverse, as a pair of (nested) tuples of scalars."""
+def _euler_terms(inertia, torque):
+    """What Eq. 6 needs of the inertia, solved for ω̇: gyroscopic terms and I⁻¹ M, as scalars.
+
+    With principal moments, the terms are (Iⱼ − Iₖ)/Iᵢ of each axis i, the factor of ωⱼ ωₖ. With
+    a tensor they are, axis by axis, the factors of all the products in PRODUCTS.
+    """
     if inertia.ndim == 1:
-        return tuple(inertia), tuple(1 / inertia)
-    return tuple(map(tuple, inertia)), tuple(map(tuple, _inverse(inertia)))
+        i1, i2, i3 = inertia
+        return ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3), tuple(torque / inertia)
+    inverse = _inverse(inertia)
+    cross = jnp.array(_LEVI_CIVITA, inertia.dtype)
+    factors = -jnp.einsum("il,ljm,mk->ijk", inverse, cross, inertia, precision="highest")
+    factors = factors + factors.swapaxes(1, 2)
+    terms = [[axis[j, k] / (2 if j == k else 1) for j, k in PRODUCTS] for axis in factors]
+    return sum(map(tuple, terms), ()), tuple(jnp.matmul(inverse, torque, precision="highest"))
 
 
 def _inverse(inertia):
@@ -156,35 +170,74 @@ def _inverse(inertia):
     return adjugate / jnp.sum(a * adjugate[0])
 
 
-def _apply(matrix, vector):
-    if not isinstance(matrix[0], tuple):
-        return tuple(m * v for m, v in zip(matrix, vector))
-    return tuple(sum(m * v for m, v in zip(row, vector)) for row in matrix)
+def _gyroscopic_acceleration(angular_velocity, gyroscopic):
+    """−I⁻¹ (ω × Iω), from the terms of :func:`_euler_terms`."""
+    products = [angular_velocity[j] * angular_velocity[k] for j, k in PRODUCTS]
+    if len(gyroscopic) == 3:
+        return tuple(term * product for term, product in zip(gyroscopic, products))
+    axes = (gyroscopic[:6], gyroscopic[6:12], gyroscopic[12:])
+    return tuple(sum(term * p for term, p in zip(axis, products)) for axis in axes)
 
 
-def _angular_acceleration(angular_velocity, torque, inertia):
-    """Eq. 6 solved for ω̇ = I⁻¹ (M − ω × Iω)."""
-    tensor, inverse = inertia
-    w1, w2, w3 = angular_velocity
-    h1, h2, h3 = _apply(tensor, angular_velocity)
-    m1, m2, m3 = torque
-    return _apply(
-        inverse,
-        (m1 - (w2 * h3 - w3 * h2), m2 - (w3 * h1 - w1 * h3), m3 - (w1 * h2 - w2 * h1)),
+@functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
+def _change(frameskip, start, acceleration, gyroscopic):
+    """Change of the state over one agent step, compiled as is best for the device."""
+    return jax.lax.platform_dependent(
+        start,
+        acceleration,
+        gyroscopic,
+        cpu=functools.partial(_change_in_line, frameskip),
+        default=functools.partial(_change_by_scan, frameskip),
     )
+
+
+@_change.defjvp
+def _change_jvp(frameskip, primals, tangents):
+    return jax.jvp(functools.partial(_change_by_scan, frameskip), primals, tangents)
+
+
+def _change_by_scan(frameskip, start, acceleration, gyroscopic):
+    def step(change, _):
+        return _coasting_step(*start, *change, *gyroscopic), None
+
+    change = _torque_step(*start, *acceleration, *gyroscopic)
+    return jax.lax.scan(step, change, length=frameskip)[0]
+
+
+def _change_in_line(frameskip, start, acceleration, gyroscopic):
+    """The same from the same functions, each RK4 step one loop over the batch."""
+
+    def step(change, _):
+        return one_loop(_coasting_step, *start, *change, *gyroscopic), None
+
+    change = one_loop(_torque_step, *start, *acceleration, *gyroscopic)
+    unroll = max(1, min(frameskip, STEPS_IN_LINE))
+    return jax.lax.scan(step, change, length=frameskip, unroll=unroll)[0]
+
+
+def _torque_step(*scalars):
+    """Change of the state over one RK4 step; scalars: state (7), I⁻¹ M (3), inertia terms."""
+    return _rk4_increment(scalars[:7], scalars[10:], scalars[7:10], INTEGRATION_STEP)
+
+
+def _coasting_step(*scalars):
+    """Change after one more RK4 step; scalars: start (7), change so far (7), inertia terms."""
+    start, change, gyroscopic = scalars[:7], scalars[7:14], scalars[14:]
+    state = _add(start, change)
+    return _add(change, _rk4_increment(state, gyroscopic, None, INTEGRATION_STEP))
 
 
 def _add(state, change):
     return tuple(x + dx for x, dx in zip(state, change))
 
 
-def _rk4_increment(state, torque, inertia, dt):
+def _rk4_increment(state, gyroscopic, acceleration, dt):
     def rate(state):
         quaternion, angular_velocity = state[:4], state[4:]
-        return (
-            *quaternions.derivative(quaternion, angular_velocity),
-            *_angular_acceleration(angular_velocity, torque, inertia),
-        )
+        angular_acceleration = _gyroscopic_acceleration(angular_velocity, gyroscopic)
+        if acceleration is not None:
+            angular_acceleration = _add(angular_acceleration, acceleration)
+        return *quaternions.derivative(quaternion, angular_velocity), *angular_acceleration
 
     def advance(dt, rates):
         return tuple(x + dt * k for x, k in zip(state, rates))

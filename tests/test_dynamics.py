@@ -1,7 +1,10 @@
 """Dynamics against SciPy, conservation laws, closed forms and the order of RK4."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
+import jax.test_util
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -219,3 +222,37 @@ def test_wrong_shapes_and_mixed_types_are_refused():
         dynamics.rk4_step(q, w, torque, jnp.ones((3, 2)))
     with pytest.raises(AssertionError, match="type"):
         dynamics.rk4_step(q, w.astype(jnp.float16), torque, inertia)
+
+
+def random_spacecraft(count):
+    rng = np.random.default_rng(0)
+    quaternion = Rotation.random(count, random_state=0).as_quat()
+    rate, torque = rng.uniform(-0.3, 0.3, (2, count, 3))
+    return [jnp.asarray(x, float) for x in (quaternion, rate, torque)]
+
+
+@pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
+@pytest.mark.parametrize("frameskip", [0, 5, 45])
+def test_the_loops_for_cpu_do_as_the_plain_scan(x64, inertia, frameskip):
+    """Up to rounding: the compiler contracts products and sums differently."""
+    gyroscopic, acceleration = dynamics._euler_terms(jnp.asarray(inertia, float), jnp.ones(3))
+    quaternion, rate, _ = random_spacecraft(37)
+    start = (*quaternion.T, *rate.T)
+    plain, in_line = (
+        jax.jit(jax.vmap(functools.partial(change, frameskip), (0, None, None)))(
+            start, acceleration, gyroscopic
+        )
+        for change in (dynamics._change_by_scan, dynamics._change_in_line)
+    )
+    np.testing.assert_allclose(np.stack(in_line), np.stack(plain), rtol=0, atol=1e-15)
+
+
+def test_gradient_through_an_agent_step_is_that_of_finite_differences(x64):
+    arguments = [x[0] for x in random_spacecraft(1)]
+
+    def miss(torque, inertia):
+        q, w = dynamics.propagate(*arguments[:2], torque, inertia, 5)
+        return jnp.sum(q[:3] ** 2) + jnp.sum(w**2)
+
+    for inertia in (jnp.asarray(LM50), jnp.asarray(rotated_inertia())):
+        jax.test_util.check_grads(miss, (arguments[2], inertia), order=1, modes=("fwd", "rev"))

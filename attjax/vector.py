@@ -1,0 +1,125 @@
+"""Many spacecraft side by side, with new episodes drawn only for those whose episode ended."""
+
+import functools
+
+import chex
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jax.sharding import Mesh, PartitionSpec
+
+AXIS = "devices"
+COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512}
+"""For outermost jitted functions only: JAX refuses options on a function called in another."""
+
+FRESH_SHARE = 16
+"""Places for new episodes: one for that many spacecraft; if more end at once, one for each."""
+
+
+def mesh(num_devices: int) -> Mesh:
+    """The first devices of JAX's default platform, as one axis."""
+    return Mesh(np.array(jax.devices()[:num_devices]), (AXIS,))
+
+
+def step(env, params, key: chex.PRNGKey, states, actions):
+    """One agent step of a batch; as ``env.step``, but several times cheaper.
+
+    ``vmap(env.step)`` draws a new episode for every spacecraft at every step, to use it where
+    one ended, which costs more than the physics.
+
+    Args:
+        env: an environment of :class:`attjax.AttitudeEnv`'s protocol.
+        params: its parameters, the same for all.
+        key: of this step.
+        states: batched states, (batch, ...).
+        actions: (batch,) integers.
+
+    Returns:
+        What ``env.step`` returns, each with a leading axis (batch,).
+    """
+    batch = len(actions)
+    step_key, fresh_key = jax.random.split(key)
+    observations, states, rewards, terminated, info = jax.vmap(env.step_env, (0, 0, 0, None))(
+        jax.random.split(step_key, batch), states, actions, params
+    )
+    ended = terminated | info["truncated"]
+    places = max(1, batch // FRESH_SHARE)
+
+    def fresh(count):
+        return jax.vmap(env.reset, (0, None))(jax.random.split(fresh_key, count), params)
+
+    def some(ongoing):
+        rows = jnp.nonzero(ended, size=places, fill_value=batch)[0]
+        return jax.tree.map(lambda x, new: x.at[rows].set(new, mode="drop"), ongoing, fresh(places))
+
+    def many(ongoing):
+        select = jax.vmap(lambda end, new, old: jnp.where(end, new, old))
+        return jax.tree.map(functools.partial(select, ended), fresh(batch), ongoing)
+
+    info = {**info, "final_observation": observations}
+    observations, states = jax.lax.cond(
+        jnp.sum(ended) <= places, some, many, (observations, states)
+    )
+    return observations, states, rewards, terminated, info["truncated"], info
+
+
+@struct.dataclass
+class Totals:
+    """Sums over an open-loop flight; fields are (batch,).
+
+    Attributes:
+        reward: of all steps.
+        episodes: how many ended.
+    """
+
+    reward: chex.Array
+    episodes: chex.Array
+
+
+@functools.partial(
+    jax.jit,
+    static_argnames=("env", "num_devices"),
+    donate_argnames="states",
+    compiler_options=COMPILER_OPTIONS,
+)
+def open_loop(env, params, key: chex.PRNGKey, states, actions, num_devices: int = 1):
+    """Fly a batch through given actions, with automatic reset: the fused rollout.
+
+    Args:
+        env, params: as in :func:`step`.
+        key: of all new episodes.
+        states: batched states, (batch, ...); donated.
+        actions: (steps, batch) integers.
+        num_devices: devices, or CPU cores as devices, that share the batch; it must be a
+            multiple of them. JAX makes one device of all cores, unless the configuration
+            ``jax_num_cpu_devices`` says otherwise before its first use.
+
+    Returns:
+        The states, the observations (batch, size) after the last step, and the totals.
+    """
+    shared, split = PartitionSpec(), PartitionSpec(AXIS)
+
+    def fly(key, params, states, actions):
+        keys = jax.random.split(jax.random.fold_in(key, jax.lax.axis_index(AXIS)), len(actions))
+        observations = jnp.zeros((actions.shape[1], *env.observation_space(params).shape))
+        zeros = jnp.zeros(actions.shape[1:])
+        totals = Totals(zeros, zeros.astype(int))
+
+        def body(carry, inputs):
+            states, _, totals = carry
+            observations, states, reward, terminated, truncated, _ = step(
+                env, params, inputs[0], states, inputs[1]
+            )
+            episodes = totals.episodes + (terminated | truncated)
+            return (states, observations, Totals(totals.reward + reward, episodes)), None
+
+        return jax.lax.scan(body, (states, observations, totals), (keys, actions))[0]
+
+    return jax.shard_map(
+        fly,
+        mesh=mesh(num_devices),
+        in_specs=(shared, shared, split, PartitionSpec(None, AXIS)),
+        out_specs=split,
+        check_vma=False,
+    )(key, params, states, actions)
