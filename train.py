@@ -88,7 +88,7 @@ class Run:
 
         self.folder, self.config = folder, config
         self.settings = config.settings
-        self.setup = assembly.setup(config.settings)
+        self.setup = assembly.setup(config.settings, assembly.num_devices(config.settings))
         self.env_params = assembly.env_params(self.setup)
         self.learner = learner.init(self.setup, self.env_params, jax.random.key(config.seed))
         if checkpoint.latest(folder) is not None:
@@ -101,7 +101,7 @@ class Run:
         print(
             f"preset {config.preset}, seed {config.seed}, {total:,} agent steps "
             f"({self.settings.num_updates:,} updates of {self.settings.steps_per_update:,}) "
-            f"on {device.device_kind} ({device.platform}), in {folder}"
+            f"on {self.setup.num_devices} x {device.device_kind} ({device.platform}), in {folder}"
         )
         if self.update:
             print(f"resumed at {self.agent_steps:,} agent steps")

@@ -1,5 +1,7 @@
 """From settings to the objects that they describe."""
 
+import math
+
 import jax
 import jax.numpy as jnp
 
@@ -19,14 +21,21 @@ def policy(settings: Settings) -> Policy:
     )
 
 
-def setup(settings: Settings) -> learner.Setup:
+def setup(settings: Settings, num_devices: int = 1) -> learner.Setup:
     """Environments, policy and settings of a training run."""
     reward = REWARDS[settings.reward]
     start = spacecraft.initial_state
     if settings.near_goal_share > 0:
         start = spacecraft.NearGoalStarts(settings.near_goal_share, settings.near_goal_steps)
     envs = tuple(AttitudeEnv(frameskip, reward, start) for frameskip in settings.frameskips)
-    return learner.Setup(envs, policy(settings), settings)
+    return learner.Setup(envs, policy(settings), settings, num_devices)
+
+
+def num_devices(settings: Settings) -> int:
+    """How many of the devices that there are a training run can share its work out to."""
+    shared = math.gcd(settings.num_envs, settings.minibatch_size, learner.MAX_DEVICES)
+    divisors = (n for n in range(1, shared + 1) if shared % n == 0)
+    return max(n for n in divisors if n <= len(jax.devices()))
 
 
 def env_params(setup: learner.Setup) -> tuple:

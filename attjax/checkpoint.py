@@ -19,7 +19,7 @@ from attjax.learner import Learner
 from attjax.progress import METRICS
 from attjax.settings import Settings
 
-FORMAT = 3
+FORMAT = 4
 CONFIG = "config.json"
 KEPT = 3
 
@@ -142,7 +142,10 @@ def latest(folder: Path) -> int | None:
 
 
 def restore_learner(folder: Path, template: Learner) -> Learner:
-    """The newest saved learner; ``template`` is one of the same setup, e.g. a fresh one."""
+    """The newest saved learner, placed like ``template``, one of the same settings.
+
+    The run may have used other devices, or another number of them.
+    """
     restored = _restore(folder, "learner", _storable(template))
     implementation = jax.random.key_impl(template.key)
     return restored.replace(key=jax.random.wrap_key_data(restored.key, impl=implementation))
@@ -168,7 +171,7 @@ def _restore(folder, item, template):
         raise CheckpointError(f"{folder} holds no checkpoint yet")
     device = jax.sharding.SingleDeviceSharding(jax.devices()[0])
     target = jax.tree.map(
-        lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype, sharding=device), template
+        lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype, sharding=x.sharding or device), template
     )
     path = (Path(folder) / str(update) / item).absolute()
     try:

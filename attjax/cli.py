@@ -125,6 +125,8 @@ def overrides(arguments: argparse.Namespace) -> dict:
 def select_device(name: str):
     """The JAX device for ``--device``, made the default; also turns the compile cache on.
 
+    On CPU each core becomes a device of its own, for training to share its work out to.
+
     Raises:
         UserError: there is no such device.
     """
@@ -132,6 +134,7 @@ def select_device(name: str):
 
     if name == "cpu":
         jax.config.update("jax_platforms", "cpu")
+    jax.config.update("jax_num_cpu_devices", available_cores())
     jax.config.update("jax_compilation_cache_dir", str(cache_folder()))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
     try:
@@ -142,6 +145,13 @@ def select_device(name: str):
         ) from None
     jax.config.update("jax_default_device", device)
     return device
+
+
+def available_cores() -> int:
+    """The cores that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def cache_folder() -> Path:

@@ -132,11 +132,19 @@ def peak_rate(angular_velocity, inertia):
         >>> round(peak_rate(jnp.array([0.0, 0.0, 0.4]), jnp.array(LM50_INERTIA)).item(), 4)
         0.4915
     """
+    squares = angular_velocity * jnp.matmul(
+        angular_velocity, peak_rate_form(inertia), precision="highest"
+    )
+    return jnp.sqrt(jnp.sum(squares, axis=-1))
+
+
+def peak_rate_form(inertia):
+    """(3, 3) matrix A, dimensionless, of an inertia (3,) or (3, 3): peak rate² = ω·Aω."""
     moments = principal_moments(inertia)
     low, high = jnp.min(moments), jnp.max(moments)
-    momentum = angular_momentum(inertia, angular_velocity)
-    complement = (low + high) * angular_velocity - momentum
-    return jnp.sqrt(jnp.sum(momentum * complement, axis=-1) / (low * high))
+    tensor = jnp.diag(inertia) if inertia.ndim == 1 else inertia
+    squared = jnp.matmul(tensor, tensor, precision="highest")
+    return ((low + high) * tensor - squared) / (low * high)
 
 
 def _checked(quaternion, angular_velocity, torque, inertia):

@@ -64,6 +64,7 @@ def entropy(log_probabilities: chex.Array) -> chex.Array:
     return -jnp.sum(jnp.exp(log_probabilities) * log_probabilities, axis=-1)
 
 
-def standardize(x: chex.Array) -> chex.Array:
-    """Shift and scale to mean 0 and standard deviation 1."""
-    return (x - jnp.mean(x)) / (jnp.std(x) + 1e-8)
+def standardize(x: chex.Array, mean=jnp.mean) -> chex.Array:
+    """Shift and scale to mean 0 and standard deviation 1, as ``mean`` averages."""
+    centred = x - mean(x)
+    return centred / (jnp.sqrt(mean(centred**2)) + 1e-8)

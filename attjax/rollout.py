@@ -6,7 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax.learner import Learner, episodes_at_start
+from attjax import vector
+from attjax.learner import Learner, reset, stack
 from attjax.networks import Inputs
 
 
@@ -34,64 +35,88 @@ def rollout(setup, env_params, contexts, learner) -> tuple[Learner, Step]:
     where several actions are about equally probable. The advantage is negative there, and the
     update lowers the action. It takes these steps as if they had been sampled.
     """
-    policy, num_envs = setup.policy, setup.settings.num_envs
-    greedy = greedy_rows(setup.settings)
+    greedy = greedy_rows(setup)
+    key, device_key = jax.random.split(learner.key)
+    device_key = jax.random.fold_in(device_key, jax.lax.axis_index(vector.AXIS))
 
-    def step(learner, _):
-        key, action_key, step_key = jax.random.split(learner.key, 3)
+    def step(learner, key):
+        action_key, step_key = jax.random.split(key)
         inputs = encode(setup, contexts, learner.observation)
-        log_probabilities = policy.log_probabilities(learner.params, inputs)
-        sampled = jax.random.categorical(action_key, log_probabilities)
+        log_probabilities = setup.policy.log_probabilities(learner.params, inputs)
+        sampled = sample(action_key, log_probabilities)
         action = jnp.where(greedy, jnp.argmax(log_probabilities, axis=-1), sampled)
-        results = [
-            jax.vmap(env.step, (0, 0, 0, None))(keys, state, action_, params)
-            for env, keys, state, action_, params in zip(
-                setup.envs,
-                (jax.random.split(step_key, num_envs)[group] for group in setup.slices),
-                learner.env_states,
-                (action[group] for group in setup.slices),
-                env_params,
-            )
-        ]
-        observations, env_states, *rest = zip(*results)
-        reward, terminated, truncated, info = map(_concatenate, rest)
-        score = learner.score + info["score"]
-        step = Step(
-            inputs=inputs,
-            action=action,
-            log_probability=pick(log_probabilities, action),
-            reward=reward * setup.settings.reward_scale,
-            terminated=terminated,
-            truncated=truncated,
-            final_observation=info["final_observation"],
-            score=score,
-            is_whole=learner.is_whole,
-            outcome=info["outcome"],
-        )
-        ended = terminated | truncated
-        learner = learner.replace(
-            env_states=env_states,
-            observation=jnp.concatenate(observations),
-            score=jnp.where(ended, 0.0, score),
-            is_whole=jnp.where(ended, episodes_at_start(env_states), learner.is_whole),
-            key=key,
-        )
-        return learner, step
+        learner, results = fly(setup, env_params, learner, action, step_key)
+        log_probability = pick(log_probabilities, action)
+        return learner, Step(inputs, action, log_probability, **results)
 
-    return jax.lax.scan(step, learner, length=setup.settings.rollout_length)
+    keys = jax.random.split(device_key, setup.settings.rollout_length)
+    learner, steps = jax.lax.scan(step, learner, keys)
+    return learner.replace(key=key), steps
 
 
-def greedy_rows(settings) -> np.ndarray:
-    """(num_envs,) bool, which spacecraft act greedily: ``greedy_share`` of them, spread evenly."""
-    count_before = np.floor(np.arange(settings.num_envs + 1) * settings.greedy_share)
-    return np.diff(count_before) > 0
+def fly(setup, env_params, learner, action, key) -> tuple[Learner, dict]:
+    """One agent step of all spacecraft, ended episodes restarted; and its part of a Step."""
+    step_key, restart_key = jax.random.split(key)
+    keys = jax.random.split(step_key, len(action))
+    flown = []
+    for env, params, part in zip(setup.envs, env_params, setup.slices):
+        rows = jax.tree.map(lambda x, part=part: x[part], (keys, learner.states, action))
+        flown.append(jax.vmap(env.step_env, (0, 0, 0, None))(*rows, params))
+    observation, states, reward, terminated, info = _concatenate(flown)
+    score = learner.score + info["score"]
+    ended = terminated | info["truncated"]
+    results = {
+        "reward": reward * setup.settings.reward_scale,
+        "terminated": terminated,
+        "truncated": info["truncated"],
+        "final_observation": observation,
+        "score": score,
+        "is_whole": learner.is_whole,
+        "outcome": info["outcome"],
+    }
+    all_params, group_of_row = stack(env_params), jnp.asarray(setup.group_of_row)
+    observation, states = vector.restart(
+        lambda key, row: reset(setup, all_params, key, group_of_row[row]),
+        restart_key,
+        ended,
+        (observation, states),
+    )
+    learner = learner.replace(
+        states=states,
+        observation=observation,
+        score=jnp.where(ended, 0.0, score),
+        is_whole=jnp.where(ended, states.time == 0, learner.is_whole),
+    )
+    return learner, results
+
+
+def sample(key, log_probabilities) -> chex.Array:
+    """A random action for each row, by inversion of the cumulative probabilities.
+
+    It takes one random number a row, where the Gumbel trick takes one an action and costs more
+    than the physics. Masked actions are never drawn, and always some action is: the threshold
+    stays a millionth below the sum, whatever the rounding.
+    """
+    probabilities = jnp.exp(log_probabilities)
+    actions = probabilities.shape[-1]
+    up_to = np.triu(np.ones((actions, actions), probabilities.dtype))
+    cumulative = jnp.matmul(probabilities, up_to, precision="highest")
+    uniform = jax.random.uniform(key, cumulative[..., :1].shape, probabilities.dtype)
+    threshold = uniform * (1 - 1e-6) * cumulative[..., -1:]
+    return jnp.argmax((cumulative > threshold) & (probabilities > 0), axis=-1)
+
+
+def greedy_rows(setup) -> np.ndarray:
+    """(envs_per_device,) bool, who acts greedily: ``greedy_share`` of them, spread evenly."""
+    rows = np.arange(setup.envs_per_device + 1)
+    return np.diff(np.floor(rows * setup.settings.greedy_share)) > 0
 
 
 def encode(setup, contexts, observation) -> Inputs:
-    """Network inputs of the (num_envs, size) observations, each group in its own context."""
+    """Network inputs of a device's (envs, size) observations, each group in its own context."""
     encode_group = jax.vmap(setup.policy.encode, (0, None))
     return _concatenate(
-        [encode_group(observation[group], c) for group, c in zip(setup.slices, contexts)]
+        [encode_group(observation[part], c) for part, c in zip(setup.slices, contexts)]
     )
 
 
@@ -106,7 +131,7 @@ def episode_sums(setup, steps: Step) -> dict[str, chex.Array]:
         **{name: ended * x for name, x in steps.outcome.items()},
     }
     return {
-        name: jnp.stack([jnp.sum(x[:, group]) for group in setup.slices])
+        name: jnp.stack([jnp.sum(x[:, part]) for part in setup.slices])
         for name, x in columns.items()
     }
 

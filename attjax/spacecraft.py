@@ -78,7 +78,11 @@ def default_params(frameskip: int = 20) -> EnvParams:
 
 def initial_state(key: chex.PRNGKey, params: EnvParams) -> EnvState:
     """A spacecraft at rest, turned by a uniform angle about a uniformly distributed axis."""
-    u = jax.random.uniform(key, (3,), params.inertia.dtype)
+    return _slew(jax.random.uniform(key, (3,), params.inertia.dtype), params)
+
+
+def _slew(u, params):
+    """The slew that three uniform numbers stand for."""
     axis = _direction(u[:2])
     angle = params.min_slew_angle + u[2] * (params.max_slew_angle - params.min_slew_angle)
     return EnvState(
@@ -107,15 +111,14 @@ class NearGoalStarts:
 
     def __call__(self, key: chex.PRNGKey, params: EnvParams) -> EnvState:
         """Draw one; the signature of :func:`initial_state`."""
-        slew_key, key = jax.random.split(key)
-        u = jax.random.uniform(key, (7,), params.inertia.dtype)
+        u = jax.random.uniform(key, (10,), params.inertia.dtype)
         angle, rate = 10.0 ** (-6 * u[0]), 0.5 * params.rate_limit * 10.0 ** (-5 * u[1])
         near = EnvState(
             quaternion=quaternions.from_axis_angle(_direction(u[2:4]), angle),
             angular_velocity=rate * _direction(u[4:6]),
             time=jnp.maximum(params.max_steps_in_episode - self.steps, 1),
         )
-        slew = initial_state(slew_key, params)
+        slew = _slew(u[7:], params)
         return jax.tree.map(lambda a, b: jnp.where(u[6] < self.share, a, b), near, slew)
 
 

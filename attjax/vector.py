@@ -13,8 +13,8 @@ AXIS = "devices"
 COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512}
 """For outermost jitted functions only: JAX refuses options on a function called in another."""
 
-FRESH_SHARE = 16
-"""Places for new episodes: one for that many spacecraft; if more end at once, one for each."""
+PORTIONS = 16
+"""New episodes are drawn for a batch's 16th part at a time: rarely more end in one step."""
 
 
 def mesh(num_devices: int) -> Mesh:
@@ -43,25 +43,42 @@ def step(env, params, key: chex.PRNGKey, states, actions):
     observations, states, rewards, terminated, info = jax.vmap(env.step_env, (0, 0, 0, None))(
         jax.random.split(step_key, batch), states, actions, params
     )
-    ended = terminated | info["truncated"]
-    places = max(1, batch // FRESH_SHARE)
-
-    def fresh(count):
-        return jax.vmap(env.reset, (0, None))(jax.random.split(fresh_key, count), params)
-
-    def some(ongoing):
-        rows = jnp.nonzero(ended, size=places, fill_value=batch)[0]
-        return jax.tree.map(lambda x, new: x.at[rows].set(new, mode="drop"), ongoing, fresh(places))
-
-    def many(ongoing):
-        select = jax.vmap(lambda end, new, old: jnp.where(end, new, old))
-        return jax.tree.map(functools.partial(select, ended), fresh(batch), ongoing)
-
     info = {**info, "final_observation": observations}
-    observations, states = jax.lax.cond(
-        jnp.sum(ended) <= places, some, many, (observations, states)
+    truncated = info["truncated"]
+    observations, states = restart(
+        lambda key, _: env.reset(key, params),
+        fresh_key,
+        terminated | truncated,
+        (observations, states),
     )
-    return observations, states, rewards, terminated, info["truncated"], info
+    return observations, states, rewards, terminated, truncated, info
+
+
+def restart(reset, key: chex.PRNGKey, ended, ongoing):
+    """Replace what belongs to ended episodes by fresh ones, a portion of the batch at a time.
+
+    Args:
+        reset: function of a key and a row of the batch, to what belongs to that row.
+        key: of the new episodes.
+        ended: (batch,) bool.
+        ongoing: pytree with leaves (batch, ...).
+
+    Returns:
+        The pytree with the ended rows replaced.
+    """
+    batch = len(ended)
+    portion = max(1, batch // PORTIONS)
+
+    def replace(carry):
+        key, ended, ongoing = carry
+        key, fresh_key = jax.random.split(key)
+        is_ended, rows = jax.lax.top_k(ended.astype(jnp.float32), portion)
+        fresh = jax.vmap(reset)(jax.random.split(fresh_key, portion), rows)
+        rows = jnp.where(is_ended > 0, rows, batch)
+        ongoing = jax.tree.map(lambda x, new: x.at[rows].set(new, mode="drop"), ongoing, fresh)
+        return key, ended.at[rows].set(False, mode="drop"), ongoing
+
+    return jax.lax.while_loop(lambda carry: jnp.any(carry[1]), replace, (key, ended, ongoing))[2]
 
 
 @struct.dataclass

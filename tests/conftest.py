@@ -2,6 +2,8 @@ import jax
 import pytest
 from commands import STEPS_PER_UPDATE, TINY, run
 
+jax.config.update("jax_num_cpu_devices", 2)  # what is shared out over devices is tested on two
+
 
 @pytest.fixture
 def x64():

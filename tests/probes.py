@@ -49,7 +49,7 @@ class Probe:
         state = ProbeState(jnp.stack([sign, 0.0]), jnp.zeros((), jnp.int32))
         return state.observation, state
 
-    def step(self, key, state, action, params):
+    def step_env(self, key, state, action, params):
         time = state.time + 1
         sign = state.observation[0]
         final = jnp.stack([sign, time / self.length * self.shows_time])
@@ -60,10 +60,7 @@ class Probe:
             "last": jnp.where(at_end, 1.0, 0.0),
             "match": jnp.where((action == 1) == (sign > 0), 1.0, 0.0),
         }[self.reward]
-        fresh_observation, fresh = self.reset(key, params)
-        state = jax.tree.map(lambda a, b: jnp.where(at_end, a, b), fresh, ProbeState(final, time))
-        observation = jnp.where(at_end, fresh_observation, final)
         never = jnp.zeros((), bool)
         terminated, truncated = (never, at_end) if self.truncates else (at_end, never)
-        info = {"final_observation": final, "score": reward, "outcome": {}}
-        return observation, state, reward, terminated, truncated, info
+        info = {"truncated": truncated, "score": reward, "outcome": {}}
+        return final, ProbeState(final, time), reward, terminated, info

@@ -1,8 +1,12 @@
 """Small training setups that several test files share."""
 
 import dataclasses
+import functools
 
-from attjax import assembly, presets
+from jax.sharding import PartitionSpec
+
+from attjax import assembly, learner, presets, vector
+from attjax.rollout import rollout
 
 SMALL = {
     "num_envs": 64,
@@ -25,3 +29,11 @@ def settings(updates, preset=presets.PAPER_FAST, **overrides):
 def small_attitude_setup(updates, preset=presets.PRECISE, **overrides):
     overrides = {"frameskips": (5, 20)} | overrides
     return assembly.setup(settings(updates, preset, **overrides))
+
+
+def fly(setup, env_params, state):
+    """The learner and the steps of one rollout."""
+    contexts = [env.context(params) for env, params in zip(setup.envs, env_params)]
+    on_device = functools.partial(rollout, setup, env_params, contexts)
+    out_specs = (learner.LEARNER_SPECS, PartitionSpec(None, vector.AXIS))
+    return learner.on_devices(setup, on_device, (learner.LEARNER_SPECS,), out_specs)(state)

@@ -59,6 +59,17 @@ def test_restored_learner_is_the_saved_one_and_goes_on_bitwise(trained):
         np.testing.assert_array_equal(a, b)
 
 
+def test_a_run_goes_on_with_another_number_of_devices(trained):
+    folder, setup, env_params, state = trained
+    setup = dataclasses.replace(setup, num_devices=2)
+    template = learner.init(setup, env_params, jax.random.key(99))
+    restored = checkpoint.restore_learner(folder, template)
+    jax.tree.map(np.testing.assert_array_equal, restored.params, state.params)
+    later, metrics = ppo.train_block(setup, env_params, restored, 2)
+    assert later.update == 4
+    assert {int(update) for update in metrics["diverged"].values()} == {-1}
+
+
 def observe_some(env, n=50):
     keys = jax.random.split(jax.random.key(0), n)
     return jax.vmap(env.reset, (0, None))(keys, env.default_params)[0]

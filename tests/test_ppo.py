@@ -1,11 +1,15 @@
+import dataclasses
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax.sharding import PartitionSpec
 from probes import Probe
-from setups import settings, small_attitude_setup
+from setups import fly, settings, small_attitude_setup
 
-from attjax import assembly, learner, ppo, presets
+from attjax import assembly, learner, ppo, presets, vector
 from attjax.networks import Policy
 
 
@@ -15,9 +19,9 @@ def train(setup, seed=0):
     return ppo.train_block(setup, env_params, state, setup.settings.num_updates)
 
 
-def train_probe(probe, updates=60, **overrides):
+def train_probe(probe, updates=60, num_devices=1, **overrides):
     policy = Policy(hidden_sizes=(32, 32), num_actions=2)
-    setup = learner.Setup((probe,), policy, settings(updates, **overrides))
+    setup = learner.Setup((probe,), policy, settings(updates, **overrides), num_devices)
     state, _ = train(setup)
 
     def value(*observation):
@@ -47,8 +51,9 @@ def test_value_of_a_delayed_reward_is_discounted():
         assert value(1, step / 3) == pytest.approx(0.8 ** (2 - step), abs=0.07)
 
 
-def test_actions_follow_the_advantage():
-    _, probability = train_probe(Probe("match"))
+@pytest.mark.parametrize("num_devices", [1, 2])
+def test_actions_follow_the_advantage(num_devices):
+    _, probability = train_probe(Probe("match"), num_devices=num_devices)
     assert probability(1, 1, 0) > 0.95
     assert probability(0, -1, 0) > 0.95
 
@@ -154,11 +159,10 @@ def test_divergence_names_its_first_update(spoiled):
     env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(0))
     if spoiled == "observations":
-        states = state.env_states
-        broken = states[0].replace(quaternion=states[0].quaternion.at[0].set(jnp.nan))
-        state = state.replace(
-            env_states=(broken, *states[1:]), observation=state.observation.at[0].set(jnp.nan)
-        )
+        states = state.states
+        states = states.replace(quaternion=states.quaternion.at[0].set(jnp.nan))
+        observation = state.observation.at[0].set(jnp.nan)
+        state = state.replace(states=states, observation=observation)
     else:
         params = jax.tree.map(lambda x: x.at[0].set(jnp.inf), state.params)
         state = state.replace(params=params)
@@ -169,3 +173,42 @@ def test_divergence_names_its_first_update(spoiled):
 def test_healthy_runs_do_not_diverge():
     _, metrics = train(small_attitude_setup(2))
     assert {int(update) for update in metrics["diverged"].values()} == {-1}
+
+
+@pytest.mark.parametrize("count", [1, 2, 1000, 4096, 300_000])
+def test_random_order_is_a_permutation_that_mixes(count):
+    order = np.asarray(jax.jit(ppo.random_order, static_argnums=1)(jax.random.key(0), count))
+    np.testing.assert_array_equal(np.sort(order), np.arange(count))
+    if count >= 1000:
+        # The rank correlation of a random order has standard deviation 1/sqrt(count − 1).
+        correlation = np.corrcoef(order, np.arange(count))[0, 1]
+        assert abs(correlation) < 5 / np.sqrt(count - 1)
+        assert not np.array_equal(order, ppo.random_order(jax.random.key(1), count))
+
+
+def test_two_devices_take_the_gradient_step_of_one():
+    """One minibatch holds all samples, so their order and their halves do not matter."""
+    one = small_attitude_setup(1, frameskips=(20,), minibatch_size=64 * 16, passes=1)
+    env_params = assembly.env_params(one)
+    _, steps = fly(one, env_params, learner.init(one, env_params, jax.random.key(0)))
+    steps = jax.tree.map(np.asarray, steps)
+    results = []
+    for num_devices in (1, 2):
+        setup = dataclasses.replace(one, num_devices=num_devices)
+        state = learner.init(setup, env_params, jax.random.key(0))
+        optimize = functools.partial(on_samples, setup, env_params, state)
+        results.append(jax.jit(optimize)(steps))
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-3, atol=1e-7), *results)
+
+
+def on_samples(setup, env_params, state, steps):
+    """Adam's moments after an update on given steps: the gradient, up to constant factors."""
+
+    def on_device(state, steps):
+        contexts = [env.context(params) for env, params in zip(setup.envs, env_params)]
+        samples = ppo.with_advantages(setup, contexts, state, steps)
+        return ppo.optimize(setup, state, samples)[0].optimizer
+
+    split = PartitionSpec(None, vector.AXIS)
+    specs = (learner.LEARNER_SPECS, split)
+    return learner.on_devices(setup, on_device, specs, PartitionSpec())(state, steps)

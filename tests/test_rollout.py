@@ -6,10 +6,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from setups import small_attitude_setup
+from setups import fly, small_attitude_setup
 
+import attjax
 from attjax import assembly, learner, ppo, presets
-from attjax.rollout import episode_sums, greedy_rows, rollout
+from attjax.rollout import episode_sums, greedy_rows, sample
 
 
 def test_spacecraft_are_shared_out_among_the_control_rates():
@@ -32,11 +33,10 @@ def test_a_share_of_the_spacecraft_acts_greedily(share):
     setup = small_attitude_setup(1, greedy_share=share)
     env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(0))
-    contexts = [env.context(params) for env, params in zip(setup.envs, env_params)]
-    _, steps = rollout(setup, env_params, contexts, state)
+    _, steps = fly(setup, env_params, state)
     log_probabilities = setup.policy.log_probabilities(state.params, steps.inputs)
     is_most_probable = steps.action == jnp.argmax(log_probabilities, axis=-1)
-    greedy = greedy_rows(setup.settings)
+    greedy = greedy_rows(setup)
     assert [greedy[group].sum() for group in setup.slices] == [32 * share, 32 * share]
     assert is_most_probable[:, greedy].all()
     # An untrained policy is close to uniform over 19 actions.
@@ -57,7 +57,7 @@ def test_only_whole_episodes_count_in_the_metrics():
     )
     env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(0))
-    _, steps = rollout(setup, env_params, [env.context(env_params[0]) for env in setup.envs], state)
+    _, steps = fly(setup, env_params, state)
     assert not steps.terminated.any()
     ends = [np.flatnonzero(column) for column in np.asarray(steps.truncated).T]
     lengths = np.concatenate([np.diff(rows, prepend=-1) for rows in ends])
@@ -82,9 +82,46 @@ def test_training_episodes_are_capped_in_agent_steps():
 def test_staggered_episodes_start_at_random_times():
     staggered = small_attitude_setup(1, near_goal_share=0.0)
     env_params = assembly.env_params(staggered)
-    times = learner.init(staggered, env_params, jax.random.key(0)).env_states[0].time
+    times = learner.init(staggered, env_params, jax.random.key(0)).states.time
     assert len(set(times.tolist())) > 5 and int(times.max()) < 700
     together = dataclasses.replace(
         staggered, settings=dataclasses.replace(staggered.settings, stagger_episodes=False)
     )
-    assert not learner.init(together, env_params, jax.random.key(0)).env_states[0].time.any()
+    assert not learner.init(together, env_params, jax.random.key(0)).states.time.any()
+
+
+def test_sampled_actions_follow_their_probabilities_and_never_the_mask():
+    probabilities = jnp.array([0.0, 0.1, 0.0, 0.6, 0.3, 0.0])
+    log_probabilities = jnp.broadcast_to(jnp.log(probabilities), (200_000, 6))
+    counts = jnp.bincount(sample(jax.random.key(0), log_probabilities), length=6)
+    # Five standard deviations of a frequency.
+    np.testing.assert_allclose(counts / 200_000, probabilities, atol=5 * 0.5 / 200_000**0.5)
+    assert counts[jnp.array([0, 2, 5])].sum() == 0
+
+
+@pytest.mark.parametrize("num_devices", [1, 2])
+def test_every_spacecraft_and_device_draws_its_own_numbers(num_devices):
+    setup = small_attitude_setup(1, near_goal_share=0.0, greedy_share=0.0)
+    setup = dataclasses.replace(setup, num_devices=num_devices)
+    env_params = assembly.env_params(setup)
+    state = learner.init(setup, env_params, jax.random.key(0))
+    assert len(np.unique(state.states.quaternion[:, 3])) == 64
+    _, steps = fly(setup, env_params, state)
+    assert steps.action.shape == (16, 64)
+    assert len(np.unique(steps.action, axis=1).T) == 64
+
+
+def test_devices_hold_the_environments_of_their_part():
+    """Row i of a device steps with the control period that the policy is told."""
+    setup = dataclasses.replace(small_attitude_setup(1, near_goal_share=0.0), num_devices=2)
+    env_params = assembly.env_params(setup)
+    state = learner.init(setup, env_params, jax.random.key(0))
+    before = state.states
+    _, steps = fly(setup, env_params, state)
+    first = jax.tree.map(lambda x: x[0], steps)
+    for group, env in enumerate(setup.envs):
+        rows = np.flatnonzero(np.tile(setup.group_of_row, 2) == group)
+        start, action = jax.tree.map(lambda x, rows=rows: x[rows], (before, first.action))
+        step = jax.vmap(attjax.step, (0, 0, None, None))
+        after = step(start, action, env.default_params, env.frameskip)
+        np.testing.assert_allclose(first.final_observation[rows, :4], after.quaternion, atol=1e-6)

@@ -1,0 +1,76 @@
+"""Batches: restarting only what ended, and the fused open-loop rollout."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from attjax import AttitudeEnv, vector
+
+ENV = AttitudeEnv(frameskip=5)
+
+
+def fleet(count, max_steps=1750):
+    params = ENV.default_params.replace(max_steps_in_episode=jnp.int32(max_steps))
+    keys = jax.random.split(jax.random.key(1), count)
+    return params, jax.vmap(ENV.reset, (0, None))(keys, params)[1]
+
+
+@pytest.mark.parametrize("ended_count", [0, 1, 5, 23, 40])
+def test_restart_replaces_all_that_ended_and_nothing_else(ended_count):
+    """Whether fewer end than are drawn at a time, or all."""
+    rows = jax.random.permutation(jax.random.key(0), 40)[:ended_count]
+    ended = jnp.zeros(40, bool).at[rows].set(True)
+
+    def reset(key, row):
+        return {"row": row, "number": jax.random.uniform(key)}
+
+    ongoing = {"row": jnp.full(40, -1), "number": jnp.full(40, 2.0)}
+    after = jax.jit(vector.restart, static_argnums=0)(reset, jax.random.key(2), ended, ongoing)
+    np.testing.assert_array_equal(after["row"], jnp.where(ended, jnp.arange(40), -1))
+    np.testing.assert_array_equal(after["number"] == 2.0, ~ended)
+    assert len(np.unique(after["number"][ended])) == ended_count
+
+
+def test_step_is_the_environment_s_own_but_for_the_fresh_episodes():
+    params, states = fleet(64, max_steps=3)
+    states = states.replace(time=jnp.arange(64) % 3)
+    actions = jax.random.randint(jax.random.key(3), (64,), 0, 19)
+    ours = vector.step(ENV, params, jax.random.key(4), states, actions)
+    keys = jax.random.split(jax.random.key(5), 64)
+    expected = jax.vmap(ENV.step, (0, 0, 0, None))(keys, states, actions, params)
+    ended = np.asarray(states.time == 2)
+    for a, b in zip(ours[2:], expected[2:]):
+        jax.tree.map(lambda x, y: np.testing.assert_allclose(x, y, atol=1e-5), a, b)
+    for a, b in zip(jax.tree.leaves(ours[:2]), jax.tree.leaves(expected[:2])):
+        np.testing.assert_allclose(a[~ended], b[~ended], atol=1e-6)
+    fresh_observation, fresh = jax.tree.map(lambda x: x[ended], ours[:2])
+    assert not fresh.time.any() and not fresh.angular_velocity.any()
+    assert len(np.unique(fresh.quaternion[:, 3])) == ended.sum()
+    np.testing.assert_array_equal(fresh_observation[:, :4], fresh.quaternion)
+
+
+@pytest.mark.parametrize("num_devices", [1, 2])
+def test_open_loop_sums_what_single_steps_give(num_devices):
+    params, states = fleet(32)
+    actions = jax.random.randint(jax.random.key(3), (20, 32), 0, 19)
+    expected, reward = states, 0.0
+    step = jax.jit(vector.step, static_argnums=0)
+    for action in actions:
+        _, expected, r, _, _, _ = step(ENV, params, jax.random.key(0), expected, action)
+        reward += r
+    final, observation, totals = vector.open_loop(
+        ENV, params, jax.random.key(4), states, actions, num_devices=num_devices
+    )
+    np.testing.assert_allclose(final.quaternion, expected.quaternion, atol=1e-5)
+    np.testing.assert_allclose(observation[:, 8:], expected.angular_velocity, atol=1e-5)
+    np.testing.assert_allclose(totals.reward, reward, atol=1e-3)
+    assert not totals.episodes.any()
+
+
+def test_open_loop_restarts_and_counts_episodes():
+    params, states = fleet(32, max_steps=4)
+    actions = jnp.zeros((10, 32), int)
+    final, _, totals = vector.open_loop(ENV, params, jax.random.key(4), states, actions)
+    assert set(np.asarray(totals.episodes)) == {2}
+    assert set(np.asarray(final.time)) == {2}
