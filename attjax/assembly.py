@@ -31,11 +31,15 @@ def setup(settings: Settings, num_devices: int = 1) -> learner.Setup:
     return learner.Setup(envs, policy(settings), settings, num_devices)
 
 
+MIN_SAMPLES = 512
+"""Samples of a minibatch on a device below which sharing it out costs more than it gains."""
+
+
 def num_devices(settings: Settings) -> int:
-    """How many of the devices that there are a training run can share its work out to."""
+    """How many of the devices that there are a training run shares its work out to."""
     shared = math.gcd(settings.num_envs, settings.minibatch_size, learner.MAX_DEVICES)
-    divisors = (n for n in range(1, shared + 1) if shared % n == 0)
-    return max(n for n in divisors if n <= len(jax.devices()))
+    most = min(len(jax.devices()), max(1, settings.minibatch_size // MIN_SAMPLES))
+    return max(n for n in range(1, shared + 1) if shared % n == 0 and n <= most)
 
 
 def env_params(setup: learner.Setup) -> tuple:

@@ -13,6 +13,9 @@ AXIS = "devices"
 COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512}
 """For outermost jitted functions only: JAX refuses options on a function called in another."""
 
+CPU_BLOCK = 4096
+"""Spacecraft whose states and intermediate results fit a core's cache."""
+
 PORTIONS = 16
 """New episodes are drawn for a batch's 16th part at a time: rarely more end in one step."""
 
@@ -116,27 +119,39 @@ def open_loop(env, params, key: chex.PRNGKey, states, actions, num_devices: int 
         The states, the observations (batch, size) after the last step, and the totals.
     """
     shared, split = PartitionSpec(), PartitionSpec(AXIS)
-
-    def fly(key, params, states, actions):
-        keys = jax.random.split(jax.random.fold_in(key, jax.lax.axis_index(AXIS)), len(actions))
-        observations = jnp.zeros((actions.shape[1], *env.observation_space(params).shape))
-        zeros = jnp.zeros(actions.shape[1:])
-        totals = Totals(zeros, zeros.astype(int))
-
-        def body(carry, inputs):
-            states, _, totals = carry
-            observations, states, reward, terminated, truncated, _ = step(
-                env, params, inputs[0], states, inputs[1]
-            )
-            episodes = totals.episodes + (terminated | truncated)
-            return (states, observations, Totals(totals.reward + reward, episodes)), None
-
-        return jax.lax.scan(body, (states, observations, totals), (keys, actions))[0]
-
     return jax.shard_map(
-        fly,
+        functools.partial(_fly_in_blocks, env),
         mesh=mesh(num_devices),
         in_specs=(shared, shared, split, PartitionSpec(None, AXIS)),
         out_specs=split,
         check_vma=False,
-    )(key, params, states, actions)
+    )(params, jax.random.split(key, num_devices), states, actions)
+
+
+def _fly_in_blocks(env, params, keys, states, actions):
+    """A device's part of the batch; on CPU block after block, each small enough for the cache."""
+    steps, batch = actions.shape
+    on_cpu = jax.devices()[0].platform == "cpu"
+    blocks = batch // CPU_BLOCK if on_cpu and batch % CPU_BLOCK == 0 else 1
+    keys = jax.random.split(keys[jax.lax.axis_index(AXIS)], blocks)
+    states = jax.tree.map(lambda x: x.reshape(blocks, -1, *x.shape[1:]), states)
+    actions = actions.reshape(steps, blocks, -1).swapaxes(0, 1)
+    flown = jax.lax.map(lambda block: _fly(env, params, *block), (keys, states, actions))
+    return jax.tree.map(lambda x: x.reshape(batch, *x.shape[2:]), flown)
+
+
+def _fly(env, params, key, states, actions):
+    batch = actions.shape[1]
+    observations = jnp.zeros((batch, *env.observation_space(params).shape))
+    totals = Totals(jnp.zeros(batch), jnp.zeros(batch, int))
+
+    def body(carry, inputs):
+        states, _, totals = carry
+        observations, states, reward, terminated, truncated, _ = step(
+            env, params, inputs[0], states, inputs[1]
+        )
+        episodes = totals.episodes + (terminated | truncated)
+        return (states, observations, Totals(totals.reward + reward, episodes)), None
+
+    inputs = (jax.random.split(key, len(actions)), actions)
+    return jax.lax.scan(body, (states, observations, totals), inputs)[0]

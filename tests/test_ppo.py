@@ -212,3 +212,10 @@ def on_samples(setup, env_params, state, steps):
     split = PartitionSpec(None, vector.AXIS)
     specs = (learner.LEARNER_SPECS, split)
     return learner.on_devices(setup, on_device, specs, PartitionSpec())(state, steps)
+
+
+def test_small_minibatches_are_not_shared_out():
+    assert len(jax.devices()) == 2
+    assert assembly.num_devices(presets.PRECISE) == 2
+    assert assembly.num_devices(presets.PAPER_FAST) == 1
+    assert assembly.num_devices(dataclasses.replace(presets.PRECISE, num_envs=2047)) == 1
