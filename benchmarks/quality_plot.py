@@ -29,7 +29,7 @@ def plot(curves: dict, plateau: float, path: Path) -> None:
     level(returns, plateau, "the paper's mean and its plateau")
     errors.plot([], [], "*", color="white", label="Table 2 beaten; plateau reached", **STAR)
     errors.set(yscale="log", xscale="log", ylabel="terminal error at 40 Hz, mean (°)")
-    returns.set(xlabel="time since the start of train.py, one core (s)")
+    returns.set(xlabel="time since the start of train.py (s)")
     returns.set_ylabel("return at 11.43 Hz, mean (Eq. 12–13)")
     returns.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     returns.xaxis.set_major_formatter(ScalarFormatter())

@@ -1,4 +1,4 @@
-"""Seconds from the start of train.py until its greedy policy is good, one core, by recipe.
+"""Seconds from the start of train.py until its greedy policy is good, by recipe.
 
 Good is (a) a greedy return of 2,500 at frameskip 20, the paper's plateau, and (b) all of the
 paper's Table 2 but its minima, which are single draws, beaten at 40 Hz. train.py runs as a
@@ -74,7 +74,6 @@ def main(argv=None):
     """Train all recipes and print the table."""
     arguments = parse_arguments(argv)
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
-    common.restrict_to_cores(1)
     machine, curves = common.machine(), {}
     common.print_machine(machine)
     for name in arguments.recipes:
