@@ -134,7 +134,8 @@ def select_device(name: str):
 
     if name == "cpu":
         jax.config.update("jax_platforms", "cpu")
-    jax.config.update("jax_num_cpu_devices", available_cores())
+    with contextlib.suppress(RuntimeError):  # called where JAX runs already, as it is set up there
+        jax.config.update("jax_num_cpu_devices", available_cores())
     jax.config.update("jax_compilation_cache_dir", str(cache_folder()))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
     try:
