@@ -9,14 +9,18 @@ from attjax.controllers import average_torque
 from attjax.spacecraft import EnvState
 
 ENV = AttitudeEnv(frameskip=5)
-PARAMS = ENV.default_params.replace(max_steps_in_episode=jnp.array(400, jnp.int32))
 CONTROLLER = jax.tree_util.Partial(controllers.phase_plane)
+
+
+def fly():
+    params = ENV.default_params.replace(max_steps_in_episode=jnp.array(400, jnp.int32))
+    flown = evaluation.fly(CONTROLLER, ENV, params, jax.random.key(2), 100)
+    return plots.Flight(CONTROLLER, ENV, params, 2, flown)
 
 
 @pytest.fixture(scope="module")
 def flight():
-    flown = evaluation.fly(CONTROLLER, ENV, PARAMS, jax.random.key(2), 100)
-    return plots.Flight(CONTROLLER, ENV, PARAMS, 2, flown)
+    return fly()
 
 
 def test_every_figure_is_written(flight, tmp_path):
@@ -35,12 +39,17 @@ def test_every_figure_is_written(flight, tmp_path):
         assert pixels.shape[0] > 500 and pixels[..., :3].std() > 0.01
 
 
-def test_recorded_slews_are_the_flown_ones(flight):
-    """Histories and statistics come from two loops; they must tell of the same flights."""
+def test_recorded_slews_are_the_flown_ones(x64):
+    """Histories and statistics come from two loops; they must tell of the same flights.
+
+    In float64: compiled apart, float32 loops differ in the last bit, on which a decision of the
+    controller depends now and then.
+    """
+    flight = fly()
     time, history = flight.record(flight.starts)
     assert time[0] == ENV.control_period and len(time) == 400
     angles = jax.vmap(quaternions.error_angle)(history.quaternion[-1])
-    np.testing.assert_allclose(angles, flight.flown.terminal_angle, atol=2e-6)
+    np.testing.assert_allclose(angles, flight.flown.terminal_angle, atol=1e-9)
     impulses = np.linalg.norm(history.torque, axis=-1).sum(axis=0) / 240
     np.testing.assert_allclose(impulses, flight.flown.impulse, rtol=1e-2)
 
@@ -66,7 +75,7 @@ def test_time_optimal_reference_of_table_5():
 
 def test_record_keeps_every_step():
     start = EnvState(jnp.array([[0.0, 0, 0, 1]]), jnp.zeros((1, 3)), jnp.zeros(1, jnp.int32))
-    history = evaluation.record(CONTROLLER, ENV, PARAMS, start, 7)
+    history = evaluation.record(CONTROLLER, ENV, ENV.default_params, start, 7)
     assert history.quaternion.shape == (7, 1, 4)
     assert history.angular_velocity.shape == history.torque.shape == (7, 1, 3)
     assert not history.torque.any()
