@@ -88,7 +88,7 @@ def update(setup: Setup, env_params: tuple, learner: Learner):
 
     Returns:
         The learner, its metrics and {name: bool} whether each checked quantity is finite, all
-        of them the same on every device but for the learner's groups.
+        of them the same on every device but for the learner's spacecraft.
     """
     contexts = [env.context(params) for env, params in zip(setup.envs, env_params)]
     learner, steps = rollout(setup, env_params, contexts, learner)
