@@ -11,6 +11,12 @@ from attjax.networks import Policy
 from attjax.reward import REWARDS
 from attjax.settings import Settings
 
+MAX_DEVICES = 8
+"""Most devices of a run, a power of two as their number is."""
+
+MIN_SAMPLES = 512
+"""Samples of a minibatch on a device below which sharing it out costs more than it gains."""
+
 
 def policy(settings: Settings) -> Policy:
     """The policy, without parameters."""
@@ -31,13 +37,9 @@ def setup(settings: Settings, num_devices: int = 1) -> learner.Setup:
     return learner.Setup(envs, policy(settings), settings, num_devices)
 
 
-MIN_SAMPLES = 512
-"""Samples of a minibatch on a device below which sharing it out costs more than it gains."""
-
-
 def num_devices(settings: Settings) -> int:
     """How many of the devices that there are a training run shares its work out to."""
-    shared = math.gcd(settings.num_envs, settings.minibatch_size, learner.MAX_DEVICES)
+    shared = math.gcd(settings.num_envs, settings.minibatch_size, MAX_DEVICES)
     most = min(len(jax.devices()), max(1, settings.minibatch_size // MIN_SAMPLES))
     return max(n for n in range(1, shared + 1) if shared % n == 0 and n <= most)
 

@@ -16,8 +16,6 @@ from attjax import vector
 from attjax.networks import Policy
 from attjax.settings import Settings
 
-MAX_DEVICES = 8
-
 
 @dataclasses.dataclass(frozen=True)
 class Setup:

@@ -186,6 +186,17 @@ def parser(name: str, description: str) -> cli.Parser:
     return parser
 
 
+def add_num_envs(parser: cli.Parser, default: tuple[int, ...]) -> None:
+    """Add --num-envs."""
+    parser.add_argument(
+        "--num-envs",
+        type=positive_integers,
+        default=list(default),
+        metavar="N,N,...",
+        help=f"numbers of spacecraft (default: {','.join(map(str, default))})",
+    )
+
+
 def writable_file(text: str) -> Path:
     """An argparse type: a file in a folder that exists."""
     path = Path(text)

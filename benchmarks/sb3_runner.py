@@ -65,12 +65,12 @@ class BatchedEnv(VecEnv):
         return [getattr(self, attr_name)] * self.num_envs
 
     def set_attr(self, attr_name, value, indices=None):
-        """Not supported."""
-        raise NotImplementedError
+        """Set the attribute, which all environments share."""
+        setattr(self, attr_name, value)
 
     def env_method(self, method_name, *method_args, indices=None, **method_kwargs):
-        """Not supported."""
-        raise NotImplementedError
+        """The method's result, once for each environment."""
+        return [getattr(self, method_name)(*method_args, **method_kwargs)] * self.num_envs
 
     def env_is_wrapped(self, wrapper_class, indices=None):
         """No environment is."""

@@ -31,13 +31,7 @@ MEMORY_NOTE = "Peak memory is the whole process's, with Python, JAX and the comp
 def parse_arguments(argv):
     """The command line; --child is for the processes that this script starts."""
     parser = common.parser("scaling.py", __doc__)
-    parser.add_argument(
-        "--num-envs",
-        type=common.positive_integers,
-        default=list(NUM_ENVS),
-        metavar="N,N,...",
-        help=f"numbers of spacecraft (default: {','.join(map(str, NUM_ENVS))})",
-    )
+    common.add_num_envs(parser, NUM_ENVS)
     cli.add_number(parser, "repeats", int, 7, "measurements of each figure", low=1)
     cli.add_number(parser, "cores", int, 2, "compare one core and that many", low=1)
     parser.add_argument("--no-training", action="store_true", help="the simulator only")

@@ -39,13 +39,7 @@ def parse_arguments(argv):
     parser = common.parser("simulator.py", __doc__)
     plot_help = "draw throughput against the number of spacecraft"
     parser.add_argument("--plot", type=common.writable_file, metavar="FILE.png", help=plot_help)
-    parser.add_argument(
-        "--num-envs",
-        type=common.positive_integers,
-        default=list(NUM_ENVS),
-        metavar="N,N,...",
-        help=f"numbers of spacecraft (default: {','.join(map(str, NUM_ENVS))})",
-    )
+    common.add_num_envs(parser, NUM_ENVS)
     cli.add_number(parser, "repeats", int, 7, "measurements of each figure", low=1)
     cli.add_number(parser, "cores", int, 1, "processor cores; the fused rollout uses all", low=1)
     parser.add_argument("--device", choices=("cpu", "gpu"), default="cpu", help="(default: cpu)")
