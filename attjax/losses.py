@@ -60,8 +60,8 @@ def clipped_policy_loss(log_probability, old_log_probability, advantage, clip):
 
 
 def entropy(log_probabilities: chex.Array) -> chex.Array:
-    """Entropy (nats) of categorical distributions over the last axis."""
-    return -jnp.sum(jnp.exp(log_probabilities) * log_probabilities, axis=-1)
+    """(samples,) entropy, nats, of categorical distributions (actions, samples)."""
+    return -jnp.sum(jnp.exp(log_probabilities) * log_probabilities, axis=0)
 
 
 def standardize(x: chex.Array, mean=jnp.mean) -> chex.Array:

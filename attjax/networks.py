@@ -4,6 +4,7 @@ import dataclasses
 
 import chex
 import flax.linen as nn
+import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import struct
@@ -34,27 +35,43 @@ class Inputs:
     allowed: chex.Array
 
 
+class Dense(nn.Module):
+    """A layer, in full float32 on every device.
+
+    Its result has a column for each sample. CPUs are slow at the other layout's gradients with
+    respect to the kernel, and at sums over a sample's few actions.
+    """
+
+    outputs: int
+    scale: float
+
+    @nn.compact
+    def __call__(self, x, axis=0):
+        """Kernelᵀ x + bias, (outputs, samples), summed over the ``axis`` of x that holds inputs."""
+        dtype = jnp.zeros(()).dtype
+        initial = nn.initializers.orthogonal(self.scale)
+        kernel = self.param("kernel", initial, (x.shape[axis], self.outputs), dtype)
+        bias = self.param("bias", nn.initializers.zeros, (self.outputs,), dtype)
+        # Without the barrier, the transposition is moved past the product and its gradients.
+        rows = jax.lax.optimization_barrier(kernel.T)
+        product = jax.lax.dot_general(rows, x, (((1,), (axis,)), ((), ())), precision="highest")
+        return product + bias[:, None]
+
+
 class MLP(nn.Module):
-    """Multilayer perceptron with ReLU (Table 3), in full float32 on every device."""
+    """Multilayer perceptron with ReLU (Table 3)."""
 
     hidden_sizes: tuple[int, ...]
     outputs: int
     output_scale: float
 
     @nn.compact
-    def __call__(self, x):
-        """Map (..., inputs) to (..., outputs)."""
+    def __call__(self, samples):
+        """Map (samples, inputs) to (outputs, samples)."""
+        x, axis = samples, 1
         for size in self.hidden_sizes:
-            x = nn.relu(self._dense(size, 2**0.5)(x))
-        return self._dense(self.outputs, self.output_scale)(x)
-
-    def _dense(self, size, scale):
-        return nn.Dense(
-            size,
-            kernel_init=nn.initializers.orthogonal(scale),
-            param_dtype=jnp.zeros(()).dtype,
-            precision="highest",
-        )
+            x, axis = nn.relu(Dense(size, 2**0.5)(x, axis)), 0
+        return Dense(self.outputs, self.output_scale)(x, axis)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,7 +102,7 @@ class Policy:
 
     def init(self, policy_key, value_key, observation, context) -> dict:
         """Random parameters {"policy": ..., "value": ...} for such an observation (size,)."""
-        features = self.encode(observation, context).features
+        features = self.encode(observation, context).features[None]
         return {
             "policy": self.policy_network.init(policy_key, features),
             "value": self.value_network.init(value_key, features),
@@ -102,17 +119,19 @@ class Policy:
         return Inputs(features, allowed)
 
     def log_probabilities(self, params: dict, inputs: Inputs) -> chex.Array:
-        """LogSoftmax over the actions (Table 3), for inputs with any leading axes."""
+        """LogSoftmax over the actions (Table 3), (actions, samples), of (samples, ...) inputs."""
         logits = self.policy_network.apply(params["policy"], inputs.features)
-        return nn.log_softmax(jnp.where(inputs.allowed, logits, MASKED_LOGIT))
+        return nn.log_softmax(jnp.where(inputs.allowed.T, logits, MASKED_LOGIT), axis=0)
 
     def value(self, params: dict, features: chex.Array) -> chex.Array:
-        """V(s), for features with any leading axes."""
-        return self.value_network.apply(params["value"], features)[..., 0]
+        """(samples,) V(s) of (samples, features)."""
+        return self.value_network.apply(params["value"], features)[0]
 
     def act(self, params: dict, observation: chex.Array, context: Context) -> chex.Array:
         """The most probable action for one observation, int32."""
-        return jnp.argmax(self.log_probabilities(params, self.encode(observation, context)))
+        inputs = self.encode(observation, context)
+        batch_of_one = jax.tree.map(lambda x: x[None], inputs)
+        return jnp.argmax(self.log_probabilities(params, batch_of_one)[:, 0])
 
 
 def multiscale_features(observation: chex.Array, control_period: chex.Array) -> chex.Array:

@@ -4,6 +4,7 @@ Works with any environments of ``AttitudeEnv``'s protocol; several at once make 
 """
 
 import functools
+import math
 from typing import Any
 
 import chex
@@ -27,6 +28,9 @@ from attjax.networks import Inputs
 from attjax.rollout import Step, encode, episode_sums, pick, rollout
 
 MAX_INDEX_BITS = 18
+
+SHUFFLED_TOGETHER = 8
+"""Most neighbouring spacecraft whose samples stay together in a shuffle."""
 
 
 @struct.dataclass
@@ -160,14 +164,21 @@ def optimize(setup, learner, samples: Sample) -> tuple[Learner, dict]:
     """N passes of shuffled minibatches. Returns the learner and the losses' means.
 
     Each device shuffles its own samples; a minibatch takes the same number of each device's.
+    What is shuffled are blocks of neighbours, up to SHUFFLED_TOGETHER spacecraft at one time:
+    samples independent of each other that memory gives four times as fast as single ones.
     """
     settings = setup.settings
     transformation = optimizer(settings)
-    used = settings.minibatches * settings.minibatch_size // setup.num_devices
+    per_device = settings.minibatch_size // setup.num_devices
+    block = math.gcd(setup.envs_per_device, per_device, SHUFFLED_TOGETHER)
+    num_blocks = len(samples.action) // block
     entropy_weight = entropy_coefficient(settings, learner.update)
 
-    def gradient_step(carry, sample):
+    def gradient_step(carry, minibatch):
         params, state = carry
+        chosen, advantage = minibatch
+        sample = jax.tree.map(lambda x: take_blocks(x, num_blocks, chosen), samples)
+        sample = sample.replace(advantage=advantage)
         gradients, metrics = jax.grad(loss, argnums=1, has_aux=True)(
             setup, params, sample, entropy_weight
         )
@@ -177,14 +188,13 @@ def optimize(setup, learner, samples: Sample) -> tuple[Learner, dict]:
         return (params, {n: new[n][1] for n in params}), metrics
 
     def one_pass(carry, key):
-        order = random_order(key, len(samples.action))[:used]
-        minibatches = jax.tree.map(
-            lambda x: x[order].reshape(settings.minibatches, -1, *x.shape[1:]), samples
-        )
+        used = settings.minibatches * (per_device // block)
+        order = random_order(key, num_blocks)[:used].reshape(settings.minibatches, -1)
+        advantage = take_blocks(samples.advantage, num_blocks, order)
+        advantage = advantage.reshape(settings.minibatches, -1)
         if settings.normalize_advantage:
-            advantage = losses.standardize(minibatches.advantage, _minibatch_means)
-            minibatches = minibatches.replace(advantage=advantage)
-        return jax.lax.scan(gradient_step, carry, minibatches)
+            advantage = losses.standardize(advantage, _minibatch_means)
+        return jax.lax.scan(gradient_step, carry, (order, advantage))
 
     key, pass_key = jax.random.split(learner.key)
     pass_key = jax.random.fold_in(pass_key, jax.lax.axis_index(vector.AXIS))
@@ -195,6 +205,12 @@ def optimize(setup, learner, samples: Sample) -> tuple[Learner, dict]:
     )
     learner = learner.replace(params=params, optimizer=state, key=key)
     return learner, jax.tree.map(jnp.mean, metrics)
+
+
+def take_blocks(x, num_blocks, chosen):
+    """Some of the equal blocks that the first axis of x is made of, one after another."""
+    flat = jnp.take(x.reshape(num_blocks, -1), chosen, axis=0, mode="clip")
+    return flat.reshape(-1, *x.shape[1:])
 
 
 def random_order(key, count: int) -> chex.Array:

@@ -44,7 +44,8 @@ def rollout(setup, env_params, contexts, learner) -> tuple[Learner, Step]:
         inputs = encode(setup, contexts, learner.observation)
         log_probabilities = setup.policy.log_probabilities(learner.params, inputs)
         sampled = sample(action_key, log_probabilities)
-        action = jnp.where(greedy, jnp.argmax(log_probabilities, axis=-1), sampled)
+        most_probable = first_row(log_probabilities == jnp.max(log_probabilities, axis=0))
+        action = jnp.where(greedy, most_probable, sampled)
         learner, results = fly(setup, env_params, learner, action, step_key)
         log_probability = pick(log_probabilities, action)
         return learner, Step(inputs, action, log_probability, **results)
@@ -91,19 +92,25 @@ def fly(setup, env_params, learner, action, key) -> tuple[Learner, dict]:
 
 
 def sample(key, log_probabilities) -> chex.Array:
-    """A random action for each row, by inversion of the cumulative probabilities.
+    """(samples,) random actions, by inversion of the cumulative (actions, samples) probabilities.
 
-    It takes one random number a row, where the Gumbel trick takes one an action and costs more
-    than the physics. Masked actions are never drawn, and always some action is: the threshold
-    stays a millionth below the sum, whatever the rounding.
+    It takes one random number a sample, where the Gumbel trick takes one an action and costs
+    more than the physics. Masked actions are never drawn, and always some action is: the
+    threshold stays a millionth below the sum, whatever the rounding.
     """
     probabilities = jnp.exp(log_probabilities)
-    actions = probabilities.shape[-1]
-    up_to = np.triu(np.ones((actions, actions), probabilities.dtype))
-    cumulative = jnp.matmul(probabilities, up_to, precision="highest")
-    uniform = jax.random.uniform(key, cumulative[..., :1].shape, probabilities.dtype)
-    threshold = uniform * (1 - 1e-6) * cumulative[..., -1:]
-    return jnp.argmax((cumulative > threshold) & (probabilities > 0), axis=-1)
+    actions, samples = probabilities.shape
+    up_to = np.tri(actions, dtype=probabilities.dtype)
+    cumulative = jnp.matmul(up_to, probabilities, precision="highest")
+    uniform = jax.random.uniform(key, (samples,), probabilities.dtype)
+    threshold = uniform * (1 - 1e-6) * cumulative[-1]
+    return first_row((cumulative > threshold) & (probabilities > 0))
+
+
+def first_row(is_candidate) -> chex.Array:
+    """(samples,) the first true row of each column; what argmax gives, but it vectorises."""
+    rows = len(is_candidate)
+    return jnp.min(jnp.where(is_candidate, jnp.arange(rows)[:, None], rows - 1), axis=0)
 
 
 def greedy_rows(setup) -> np.ndarray:
@@ -141,5 +148,9 @@ def _concatenate(trees):
 
 
 def pick(log_probabilities, action):
-    """The log probability of each taken action."""
-    return jnp.take_along_axis(log_probabilities, action[..., None], axis=-1)[..., 0]
+    """(samples,) log probability of each taken action, from those of all (actions, samples).
+
+    A masked sum: gathers and their gradients, scatters, do not vectorise.
+    """
+    is_taken = jnp.arange(len(log_probabilities))[:, None] == action
+    return jnp.sum(jnp.where(is_taken, log_probabilities, 0.0), axis=0)

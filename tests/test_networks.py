@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from attjax import AttitudeEnv, dynamics, networks, observation, spacecraft
-from attjax.networks import Policy
+from attjax.networks import Inputs, Policy
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -96,12 +96,32 @@ def test_no_policy_under_the_mask_passes_the_limit(frameskip, reckless):
         assert rates.max() > 0.985 * params.rate_limit
 
 
+def batch_of_one(inputs):
+    return jax.tree.map(lambda x: x[None], inputs)
+
+
+def test_networks_map_each_sample_to_a_column():
+    """Against the layers written out in NumPy."""
+    policy = Policy(hidden_sizes=(5, 7))
+    params = parameters(policy)
+    features = np.random.default_rng(0).normal(size=(4, 11)).astype(np.float32)
+    layers = [params["policy"]["params"][f"Dense_{i}"] for i in range(3)]
+    x = features
+    for index, layer in enumerate(layers):
+        x = x @ np.asarray(layer["kernel"]) + np.asarray(layer["bias"])
+        x = np.maximum(x, 0) if index < 2 else x
+    expected = x - np.log(np.exp(x).sum(axis=1, keepdims=True))
+    inputs = Inputs(features, np.ones((4, 19), bool))
+    np.testing.assert_allclose(policy.log_probabilities(params, inputs), expected.T, rtol=1e-5)
+    assert policy.value(params, features).shape == (4,)
+
+
 def test_masked_actions_are_never_taken():
     policy = Policy(rate_margin=0.9, hidden_sizes=(8,))
     params = parameters(policy)
     inputs = policy.encode(observe([0.449, 0, 0]), CONTEXT)
     assert not inputs.allowed[1] and inputs.allowed[2]
-    log_probabilities = policy.log_probabilities(params, inputs)
+    log_probabilities = policy.log_probabilities(params, batch_of_one(inputs))[:, 0]
     assert float(jnp.exp(log_probabilities).sum()) == pytest.approx(1, rel=1e-5)
     assert jnp.exp(log_probabilities[1]) == 0
     actions = jax.random.categorical(jax.random.key(0), log_probabilities, shape=(10_000,))
@@ -116,7 +136,7 @@ def test_act_is_the_most_probable_action_at_any_rate():
         env = AttitudeEnv(frameskip)
         context = env.context(env.default_params)
         inputs = policy.encode(observe([0.1, 0.2, 0.0]), context)
-        expected = jnp.argmax(policy.log_probabilities(params, inputs))
+        expected = jnp.argmax(policy.log_probabilities(params, batch_of_one(inputs)))
         assert policy.act(params, observe([0.1, 0.2, 0.0]), context) == expected
 
 

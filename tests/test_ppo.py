@@ -25,11 +25,11 @@ def train_probe(probe, updates=60, num_devices=1, **overrides):
     state, _ = train(setup)
 
     def value(*observation):
-        return float(policy.value(state.params, jnp.array(observation, float)))
+        return float(policy.value(state.params, jnp.array([observation], float))[0])
 
     def probability(action, *observation):
-        inputs = policy.encode(jnp.array(observation, float), None)
-        return float(jnp.exp(policy.log_probabilities(state.params, inputs))[action])
+        inputs = jax.vmap(policy.encode, (0, None))(jnp.array([observation], float), None)
+        return float(jnp.exp(policy.log_probabilities(state.params, inputs))[action, 0])
 
     return value, probability
 
@@ -184,6 +184,18 @@ def test_random_order_is_a_permutation_that_mixes(count):
         correlation = np.corrcoef(order, np.arange(count))[0, 1]
         assert abs(correlation) < 5 / np.sqrt(count - 1)
         assert not np.array_equal(order, ppo.random_order(jax.random.key(1), count))
+
+
+def test_a_pass_takes_every_sample_once_and_whole():
+    """Fields stay together, neighbours in a block too, whatever their shapes."""
+    numbers = jnp.arange(48)
+    samples = {"plain": numbers, "wide": jnp.stack([numbers, -numbers], axis=1)}
+    order = jnp.array([[3, 0, 5], [1, 4, 2]])
+    taken = [jax.tree.map(lambda x, o=o: ppo.take_blocks(x, 6, o), samples) for o in order]
+    assert taken[0]["plain"].tolist() == [*range(24, 32), *range(8), *range(40, 48)]
+    np.testing.assert_array_equal(taken[1]["wide"][:, 1], -taken[1]["plain"])
+    both = np.concatenate([part["plain"] for part in taken])
+    np.testing.assert_array_equal(np.sort(both), numbers)
 
 
 def test_two_devices_take_the_gradient_step_of_one():

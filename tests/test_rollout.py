@@ -34,14 +34,16 @@ def test_a_share_of_the_spacecraft_acts_greedily(share):
     env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(0))
     _, steps = fly(setup, env_params, state)
-    log_probabilities = setup.policy.log_probabilities(state.params, steps.inputs)
-    is_most_probable = steps.action == jnp.argmax(log_probabilities, axis=-1)
+    log_probabilities = jax.vmap(setup.policy.log_probabilities, (None, 0))(
+        state.params, steps.inputs
+    )
+    is_most_probable = steps.action == jnp.argmax(log_probabilities, axis=1)
     greedy = greedy_rows(setup)
     assert [greedy[group].sum() for group in setup.slices] == [32 * share, 32 * share]
     assert is_most_probable[:, greedy].all()
     # An untrained policy is close to uniform over 19 actions.
     assert is_most_probable[:, ~greedy].mean() < 0.2
-    chosen = jnp.take_along_axis(log_probabilities, steps.action[..., None], axis=-1)[..., 0]
+    chosen = jnp.take_along_axis(log_probabilities, steps.action[:, None], axis=1)[:, 0]
     np.testing.assert_allclose(steps.log_probability, chosen, rtol=1e-5)
 
 
@@ -92,7 +94,7 @@ def test_staggered_episodes_start_at_random_times():
 
 def test_sampled_actions_follow_their_probabilities_and_never_the_mask():
     probabilities = jnp.array([0.0, 0.1, 0.0, 0.6, 0.3, 0.0])
-    log_probabilities = jnp.broadcast_to(jnp.log(probabilities), (200_000, 6))
+    log_probabilities = jnp.broadcast_to(jnp.log(probabilities)[:, None], (6, 200_000))
     counts = jnp.bincount(sample(jax.random.key(0), log_probabilities), length=6)
     # Five standard deviations of a frequency.
     np.testing.assert_allclose(counts / 200_000, probabilities, atol=5 * 0.5 / 200_000**0.5)
