@@ -4,6 +4,7 @@ import math
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from attjax import learner, spacecraft
 from attjax.env import AttitudeEnv
@@ -28,13 +29,14 @@ def policy(settings: Settings) -> Policy:
 
 
 def setup(settings: Settings, num_devices: int = 1) -> learner.Setup:
-    """Environments, policy and settings of a training run."""
+    """Environment, policy and settings of a training run."""
     reward = REWARDS[settings.reward]
     start = spacecraft.initial_state
     if settings.near_goal_share > 0:
         start = spacecraft.NearGoalStarts(settings.near_goal_share, settings.near_goal_steps)
-    envs = tuple(AttitudeEnv(frameskip, reward, start) for frameskip in settings.frameskips)
-    return learner.Setup(envs, policy(settings), settings, num_devices)
+    env = AttitudeEnv(max(settings.frameskips), reward, start)
+    groups = len(settings.frameskips)
+    return learner.Setup(env, policy(settings), settings, groups, num_devices)
 
 
 def num_devices(settings: Settings) -> int:
@@ -44,13 +46,20 @@ def num_devices(settings: Settings) -> int:
     return max(n for n in range(1, shared + 1) if shared % n == 0 and n <= most)
 
 
-def env_params(setup: learner.Setup) -> tuple:
-    """Parameters of each environment, the paper's but for the cap on the episode's length."""
-    cap = setup.settings.max_episode_steps
-    defaults = [env.default_params for env in setup.envs]
-    return tuple(
-        params.replace(max_steps_in_episode=jnp.minimum(params.max_steps_in_episode, cap))
-        for params in defaults
+def env_params(setup: learner.Setup) -> spacecraft.EnvParams:
+    """The paper's parameters, but for the cap on the episode's length.
+
+    With several control rates, each group of spacecraft has its own.
+    """
+    settings, params = setup.settings, setup.env.default_params
+    limits = [spacecraft.max_steps(frameskip) for frameskip in settings.frameskips]
+    limits = np.minimum(limits, settings.max_episode_steps).astype(np.int32)
+    if setup.groups == 1:
+        return params.replace(max_steps_in_episode=jnp.asarray(limits[0]))
+    frameskips = np.array(settings.frameskips, np.int32)
+    return params.replace(
+        max_steps_in_episode=jnp.asarray(limits[setup.group_of_row]),
+        frameskip=jnp.asarray(frameskips[setup.group_of_row]),
     )
 
 

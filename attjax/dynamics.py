@@ -61,7 +61,7 @@ def rk4_step(quaternion, angular_velocity, torque, inertia, dt=INTEGRATION_STEP)
     return jnp.stack(state[:4]), jnp.stack(state[4:])
 
 
-def propagate(quaternion, angular_velocity, torque, inertia, frameskip):
+def propagate(quaternion, angular_velocity, torque, inertia, frameskip, coasting_steps=None):
     """One agent step: an RK4 step with the torque on, then ``frameskip`` torque-free ones.
 
     Eq. 9 is linear in q, so the one normalisation at the end equals the paper's
@@ -71,16 +71,20 @@ def propagate(quaternion, angular_velocity, torque, inertia, frameskip):
     Args:
         quaternion, angular_velocity, torque, inertia: as in :func:`rk4_step`.
         frameskip: number of torque-free RK4 steps, a Python integer.
+        coasting_steps: how many of these are taken, scalar; None: all. Under ``vmap`` it lets
+            spacecraft of different control rates share one program.
 
     Returns:
-        The unit quaternion (4,) and the angular velocity (3,) after (1 + frameskip)/240 s.
+        The unit quaternion (4,) and the angular velocity (3,) after (1 + frameskip)/240 s, or
+        after (1 + coasting_steps)/240 s.
     """
     quaternion, angular_velocity, torque, inertia = _checked(
         quaternion, angular_velocity, torque, inertia
     )
     gyroscopic, acceleration = _euler_terms(inertia, torque)
     start = (*quaternion, *angular_velocity)
-    change = _change(frameskip, start, acceleration, gyroscopic)
+    limit = () if coasting_steps is None else (jnp.asarray(coasting_steps, quaternion.dtype),)
+    change = _change(frameskip, start, acceleration, gyroscopic, limit)
     state = _add(start, change)
     return quaternions.normalize(jnp.stack(state[:4])), jnp.stack(state[4:])
 
@@ -188,12 +192,16 @@ def _gyroscopic_acceleration(angular_velocity, gyroscopic):
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _change(frameskip, start, acceleration, gyroscopic):
-    """Change of the state over one agent step, compiled as is best for the device."""
+def _change(frameskip, start, acceleration, gyroscopic, limit):
+    """Change of the state over one agent step, compiled as is best for the device.
+
+    ``limit`` is empty, or holds the number of torque-free steps to take.
+    """
     return jax.lax.platform_dependent(
         start,
         acceleration,
         gyroscopic,
+        limit,
         cpu=functools.partial(_change_in_line, frameskip),
         default=functools.partial(_change_by_scan, frameskip),
     )
@@ -204,23 +212,24 @@ def _change_jvp(frameskip, primals, tangents):
     return jax.jvp(functools.partial(_change_by_scan, frameskip), primals, tangents)
 
 
-def _change_by_scan(frameskip, start, acceleration, gyroscopic):
-    def step(change, _):
-        return _coasting_step(*start, *change, *gyroscopic), None
-
-    change = _torque_step(*start, *acceleration, *gyroscopic)
-    return jax.lax.scan(step, change, length=frameskip)[0]
+def _change_by_scan(frameskip, *parts):
+    return _change_with(lambda function, *scalars: function(*scalars), 1, frameskip, *parts)
 
 
-def _change_in_line(frameskip, start, acceleration, gyroscopic):
+def _change_in_line(frameskip, *parts):
     """The same from the same functions, each RK4 step one loop over the batch."""
+    return _change_with(one_loop, max(1, min(frameskip, STEPS_IN_LINE)), frameskip, *parts)
 
-    def step(change, _):
-        return one_loop(_coasting_step, *start, *change, *gyroscopic), None
 
-    change = one_loop(_torque_step, *start, *acceleration, *gyroscopic)
-    unroll = max(1, min(frameskip, STEPS_IN_LINE))
-    return jax.lax.scan(step, change, length=frameskip, unroll=unroll)[0]
+def _change_with(call, unroll, frameskip, start, acceleration, gyroscopic, limit):
+    def step(change, index):
+        if limit:
+            return call(_due_step, index, *limit, *start, *change, *gyroscopic), None
+        return call(_coasting_step, *start, *change, *gyroscopic), None
+
+    change = call(_torque_step, *start, *acceleration, *gyroscopic)
+    indices = jnp.arange(frameskip, dtype=start[0].dtype)
+    return jax.lax.scan(step, change, indices, unroll=unroll)[0]
 
 
 def _torque_step(*scalars):
@@ -233,6 +242,12 @@ def _coasting_step(*scalars):
     start, change, gyroscopic = scalars[:7], scalars[7:14], scalars[14:]
     state = _add(start, change)
     return _add(change, _rk4_increment(state, gyroscopic, None, INTEGRATION_STEP))
+
+
+def _due_step(index, limit, *scalars):
+    """The same if it is one of the first ``limit`` steps, else no further change."""
+    change, later = scalars[7:14], _coasting_step(*scalars)
+    return tuple(jnp.where(index < limit, b, a) for a, b in zip(change, later))
 
 
 def _add(state, change):

@@ -20,7 +20,8 @@ class AttitudeEnv:
     """The slew task as an environment; by default exactly the paper's MDP.
 
     Attributes:
-        frameskip: torque-free RK4 steps in an agent step: 20 is 11.43 Hz, 5 is 40 Hz.
+        frameskip: torque-free RK4 steps in an agent step: 20 is 11.43 Hz, 5 is 40 Hz. With
+            ``params.frameskip``, the most there may be.
         reward: function of a :class:`attjax.reward.Transition`.
         initial_state: function of a key and parameters that draws the start of an episode.
 
@@ -65,8 +66,13 @@ class AttitudeEnv:
 
     def context(self, params: EnvParams) -> Context:
         """What a controller may know of this environment."""
-        period = jnp.array(self.control_period, params.inertia.dtype)
+        period = self._period(params)
         return Context(period, params.inertia, params.torque_table, params.rate_limit)
+
+    def _period(self, params):
+        frameskip = self.frameskip if params.frameskip is None else params.frameskip
+        rk4_steps = jnp.asarray(1 + frameskip, jnp.asarray(params.inertia).dtype)
+        return rk4_steps * dynamics.INTEGRATION_STEP
 
     def reset(self, key: chex.PRNGKey, params: EnvParams | None = None):
         """Start an episode. Returns the observation (11,) and the state."""
@@ -121,7 +127,7 @@ class AttitudeEnv:
             terminated=terminated,
             truncated=truncated,
             goal_angle=params.goal_angle,
-            control_period=jnp.array(self.control_period, rate.dtype),
+            control_period=self._period(params),
         )
         angle = quaternions.error_angle(next_state.quaternion)
         info = {

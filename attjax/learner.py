@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import itertools
+from typing import Any
 
 import chex
 import jax
@@ -22,35 +23,44 @@ class Setup:
     """The static part of a run.
 
     Attributes:
-        envs: environments that differ in how they step; their episodes start in the same way,
-            but for the parameters.
-        policy: the one that serves them all.
+        env: the environment. Parameters in which the spacecraft differ have a leading axis over
+            those of one device.
+        policy: what flies it.
         settings: of the run.
+        groups: of spacecraft, equal in number, that the metrics are told apart by.
         num_devices: devices, or CPU cores as devices, that share the spacecraft and each
             minibatch; a divisor of the numbers of both.
     """
 
-    envs: tuple
+    env: Any
     policy: Policy
     settings: Settings
+    groups: int = 1
     num_devices: int = 1
 
     @property
     def slices(self) -> list[slice]:
-        """Where each environment's spacecraft stand among those of one device."""
-        total, groups = self.envs_per_device, len(self.envs)
-        bounds = [i * total // groups for i in range(groups + 1)]
+        """Where each group's spacecraft stand among those of one device."""
+        bounds = [i * self.envs_per_device // self.groups for i in range(self.groups + 1)]
         return [slice(a, b) for a, b in itertools.pairwise(bounds)]
 
     @property
     def group_of_row(self) -> np.ndarray:
-        """(envs_per_device,) the number of each spacecraft's environment."""
-        return np.repeat(np.arange(len(self.envs)), [s.stop - s.start for s in self.slices])
+        """(envs_per_device,) the number of each spacecraft's group."""
+        return np.repeat(np.arange(self.groups), [s.stop - s.start for s in self.slices])
 
     @property
     def envs_per_device(self) -> int:
         """Spacecraft of one device."""
         return self.settings.num_envs // self.num_devices
+
+    def param_axes(self, env_params):
+        """For ``vmap``: 0 for parameters in which the spacecraft differ, None for the others."""
+        return jax.tree.map(
+            lambda x, default: 0 if np.ndim(x) > np.ndim(default) else None,
+            env_params,
+            self.env.default_params,
+        )
 
 
 @struct.dataclass
@@ -60,7 +70,7 @@ class Learner:
     Attributes:
         params: {"policy", "value"} network parameters.
         optimizer: {"policy", "value"} Adam's moments and step counts.
-        states: batched states of all environments, (num_envs, ...), device by device.
+        states: batched states of all spacecraft, (num_envs, ...), device by device.
         observation: (num_envs, size) current observations.
         score: (num_envs,) sum of ``info["score"]`` over the current episodes.
         is_whole: (num_envs,) whether the current episodes started at time 0; only these count
@@ -114,8 +124,8 @@ def entropy_coefficient(settings: Settings, update) -> chex.Array:
 
 
 @functools.partial(jax.jit, static_argnames="setup")
-def init(setup: Setup, env_params: tuple, key: chex.PRNGKey) -> Learner:
-    """A learner at its start. ``env_params`` holds one parameter set an environment."""
+def init(setup: Setup, env_params, key: chex.PRNGKey) -> Learner:
+    """A learner at its start, for parameters as :class:`Setup` describes them."""
     start = functools.partial(_init_on_device, setup)
     return on_devices(setup, start, (SHARED, SHARED), LEARNER_SPECS)(env_params, key)
 
@@ -124,10 +134,9 @@ def _init_on_device(setup, env_params, key):
     key, policy_key, value_key, start_key = jax.random.split(key, 4)
     start_key = jax.random.fold_in(start_key, jax.lax.axis_index(vector.AXIS))
     keys = jax.random.split(start_key, setup.envs_per_device)
-    observation, states = jax.vmap(functools.partial(_start, setup, stack(env_params)))(
-        keys, setup.group_of_row
-    )
-    context = setup.envs[0].context(env_params[0])
+    start = jax.vmap(functools.partial(_start, setup), (0, setup.param_axes(env_params)))
+    observation, states = start(keys, env_params)
+    context = setup.env.context(params_of(setup, env_params, 0))
     params = setup.policy.init(policy_key, value_key, observation[0], context)
     return Learner(
         params=params,
@@ -141,23 +150,16 @@ def _init_on_device(setup, env_params, key):
     )
 
 
-def _start(setup, env_params, key, group):
-    observation, state = reset(setup, env_params, key, group)
+def _start(setup, key, env_params):
+    observation, state = setup.env.reset(key, env_params)
     if setup.settings.stagger_episodes:
-        limit = env_params.max_steps_in_episode[group]
+        limit = env_params.max_steps_in_episode
         time = jax.random.randint(jax.random.fold_in(key, 0), (), 0, limit)
         state = state.replace(time=jnp.maximum(state.time, time))
     return observation, state
 
 
-def reset(setup, env_params, key, group):
-    """Observation and state at the start of an episode in the environment number ``group``.
-
-    ``env_params`` are those of all environments, as :func:`stack` gives them.
-    """
-    return setup.envs[0].reset(key, jax.tree.map(lambda x: x[group], env_params))
-
-
-def stack(trees):
-    """One pytree of several like ones, each leaf with a leading axis over them."""
-    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)
+def params_of(setup, env_params, row):
+    """The parameters of one of a device's spacecraft."""
+    axes = setup.param_axes(env_params)
+    return jax.tree.map(lambda x, axis: x if axis is None else x[row], env_params, axes)

@@ -1,6 +1,6 @@
 """PPO: rollout, advantages and clipped updates, fused in one jitted block.
 
-Works with any environments of ``AttitudeEnv``'s protocol; several at once make one batch.
+Works with any environment of ``AttitudeEnv``'s protocol.
 """
 
 import functools
@@ -50,12 +50,12 @@ class Sample:
     donate_argnames="learner",
     compiler_options=vector.COMPILER_OPTIONS,
 )
-def train_block(setup: Setup, env_params: tuple, learner: Learner, num_updates):
+def train_block(setup: Setup, env_params, learner: Learner, num_updates):
     """Run ``num_updates`` updates (traced, so that every block shares one compilation).
 
     Returns:
         The learner and metrics: "losses", means over the block's updates; "episodes", sums
-        over the episodes that ended, one an environment; "diverged", for each checked
+        over the episodes that ended, one a group; "diverged", for each checked
         quantity the first update in which it was not finite, −1 if none.
     """
     block = functools.partial(_block_on_device, setup)
@@ -85,7 +85,7 @@ def _block_on_device(setup, env_params, learner, num_updates):
 
 
 @functools.partial(jax.jit, static_argnames="setup")
-def update(setup: Setup, env_params: tuple, learner: Learner):
+def update(setup: Setup, env_params, learner: Learner):
     """One update on one device: rollout, advantages, N passes of minibatch gradient steps.
 
     Jitted so that it is traced once, for the shapes of its metrics and for the block's loop.
@@ -94,9 +94,8 @@ def update(setup: Setup, env_params: tuple, learner: Learner):
         The learner, its metrics and {name: bool} whether each checked quantity is finite, all
         of them the same on every device but for the learner's spacecraft.
     """
-    contexts = [env.context(params) for env, params in zip(setup.envs, env_params)]
-    learner, steps = rollout(setup, env_params, contexts, learner)
-    samples = with_advantages(setup, contexts, learner, steps)
+    learner, steps = rollout(setup, env_params, learner)
+    samples = with_advantages(setup, env_params, learner, steps)
     learner, losses_ = optimize(setup, learner, samples)
     not_finite = {
         "observations": _any_not_finite(steps.inputs.features),
@@ -112,7 +111,7 @@ def update(setup: Setup, env_params: tuple, learner: Learner):
     return learner.replace(update=learner.update + 1), metrics, finite
 
 
-def with_advantages(setup, contexts, learner, steps: Step) -> Sample:
+def with_advantages(setup, env_params, learner, steps: Step) -> Sample:
     """Values after the rollout, its advantages and the value targets.
 
     The values are computed step by step, as a step of all spacecraft fits the cache.
@@ -123,7 +122,7 @@ def with_advantages(setup, contexts, learner, steps: Step) -> Sample:
         return setup.policy.value(learner.params, features)
 
     def value_of(observation):
-        return value(encode(setup, contexts, observation).features)
+        return value(encode(setup, env_params, observation).features)
 
     values = jax.lax.map(value, steps.inputs.features)
     if settings.time_limit_terminates:
@@ -138,7 +137,7 @@ def with_advantages(setup, contexts, learner, steps: Step) -> Sample:
         next_values,
         terminated,
         steps.terminated | steps.truncated,
-        discounts(setup, contexts),
+        discounts(setup, env_params),
         settings.gae_lambda,
     )
     samples = Sample(
@@ -151,13 +150,18 @@ def with_advantages(setup, contexts, learner, steps: Step) -> Sample:
     return jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), samples)
 
 
-def discounts(setup, contexts) -> chex.Array:
+def discounts(setup, env_params) -> chex.Array:
     """(envs_per_device,) discount of an agent step, or a scalar where it is the same for all."""
     settings = setup.settings
     if settings.discount_period == 0:
         return jnp.array(settings.discount, float)
-    exponents = [c.control_period / settings.discount_period for c in contexts]
-    return settings.discount ** jnp.stack(exponents)[setup.group_of_row]
+
+    def discount(env_params):
+        period = setup.env.context(env_params).control_period
+        return settings.discount ** (period / settings.discount_period)
+
+    axes = setup.param_axes(env_params)
+    return jax.vmap(discount, (axes,), axis_size=setup.envs_per_device)(env_params)
 
 
 def optimize(setup, learner, samples: Sample) -> tuple[Learner, dict]:

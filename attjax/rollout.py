@@ -1,4 +1,4 @@
-"""Rollouts of several environments side by side, as one batch."""
+"""Rollouts: many spacecraft fly under the current policy."""
 
 import chex
 import jax
@@ -7,7 +7,7 @@ import numpy as np
 from flax import struct
 
 from attjax import vector
-from attjax.learner import Learner, reset, stack
+from attjax.learner import Learner, params_of
 from attjax.networks import Inputs
 
 
@@ -27,7 +27,7 @@ class Step:
     outcome: dict[str, chex.Array]
 
 
-def rollout(setup, env_params, contexts, learner) -> tuple[Learner, Step]:
+def rollout(setup, env_params, learner) -> tuple[Learner, Step]:
     """``rollout_length`` steps of all spacecraft under the current policy.
 
     Most sample their actions. Those of :func:`greedy_rows` take the most probable one, as in
@@ -38,32 +38,39 @@ def rollout(setup, env_params, contexts, learner) -> tuple[Learner, Step]:
     greedy = greedy_rows(setup)
     key, device_key = jax.random.split(learner.key)
     device_key = jax.random.fold_in(device_key, jax.lax.axis_index(vector.AXIS))
+    uniform_key, flight_key = jax.random.split(device_key)
 
-    def step(learner, key):
-        action_key, step_key = jax.random.split(key)
-        inputs = encode(setup, contexts, learner.observation)
+    def step(learner, random):
+        uniform, keys = random
+        inputs = encode(setup, env_params, learner.observation)
         log_probabilities = setup.policy.log_probabilities(learner.params, inputs)
-        sampled = sample(action_key, log_probabilities)
+        sampled = sample(log_probabilities, uniform)
         most_probable = first_row(log_probabilities == jnp.max(log_probabilities, axis=0))
         action = jnp.where(greedy, most_probable, sampled)
-        learner, results = fly(setup, env_params, learner, action, step_key)
+        learner, results = fly(setup, env_params, learner, action, keys)
         log_probability = pick(log_probabilities, action)
         return learner, Step(inputs, action, log_probability, **results)
 
-    keys = jax.random.split(device_key, setup.settings.rollout_length)
-    learner, steps = jax.lax.scan(step, learner, keys)
+    # Drawn all at once: a small draw costs as much to start as to make.
+    length = setup.settings.rollout_length
+    shape = (length, setup.envs_per_device)
+    uniform = jax.random.uniform(uniform_key, shape, learner.score.dtype)
+    random = (uniform, jax.random.split(flight_key, (length, 2)))
+    learner, steps = jax.lax.scan(step, learner, random)
     return learner.replace(key=key), steps
 
 
-def fly(setup, env_params, learner, action, key) -> tuple[Learner, dict]:
-    """One agent step of all spacecraft, ended episodes restarted; and its part of a Step."""
-    step_key, restart_key = jax.random.split(key)
-    keys = jax.random.split(step_key, len(action))
-    flown = []
-    for env, params, part in zip(setup.envs, env_params, setup.slices):
-        rows = jax.tree.map(lambda x, part=part: x[part], (keys, learner.states, action))
-        flown.append(jax.vmap(env.step_env, (0, 0, 0, None))(*rows, params))
-    observation, states, reward, terminated, info = _concatenate(flown)
+def fly(setup, env_params, learner, action, keys) -> tuple[Learner, dict]:
+    """One agent step of all spacecraft, ended episodes restarted; and its part of a Step.
+
+    ``keys`` are two, of the steps and of the restarts.
+    """
+    step_key, restart_key = keys
+    step_keys = jax.random.split(step_key, len(action))
+    step_env = jax.vmap(setup.env.step_env, (0, 0, 0, setup.param_axes(env_params)))
+    observation, states, reward, terminated, info = step_env(
+        step_keys, learner.states, action, env_params
+    )
     score = learner.score + info["score"]
     ended = terminated | info["truncated"]
     results = {
@@ -75,9 +82,8 @@ def fly(setup, env_params, learner, action, key) -> tuple[Learner, dict]:
         "is_whole": learner.is_whole,
         "outcome": info["outcome"],
     }
-    all_params, group_of_row = stack(env_params), jnp.asarray(setup.group_of_row)
     observation, states = vector.restart(
-        lambda key, row: reset(setup, all_params, key, group_of_row[row]),
+        lambda key, row: setup.env.reset(key, params_of(setup, env_params, row)),
         restart_key,
         ended,
         (observation, states),
@@ -91,18 +97,16 @@ def fly(setup, env_params, learner, action, key) -> tuple[Learner, dict]:
     return learner, results
 
 
-def sample(key, log_probabilities) -> chex.Array:
+def sample(log_probabilities, uniform) -> chex.Array:
     """(samples,) random actions, by inversion of the cumulative (actions, samples) probabilities.
 
-    It takes one random number a sample, where the Gumbel trick takes one an action and costs
-    more than the physics. Masked actions are never drawn, and always some action is: the
-    threshold stays a millionth below the sum, whatever the rounding.
+    It takes one random number from [0, 1) a sample, where the Gumbel trick takes one an action
+    and costs more than the physics. Masked actions are never drawn, and always some action is:
+    the threshold stays a millionth below the sum, whatever the rounding.
     """
     probabilities = jnp.exp(log_probabilities)
-    actions, samples = probabilities.shape
-    up_to = np.tri(actions, dtype=probabilities.dtype)
+    up_to = np.tri(len(probabilities), dtype=probabilities.dtype)
     cumulative = jnp.matmul(up_to, probabilities, precision="highest")
-    uniform = jax.random.uniform(key, (samples,), probabilities.dtype)
     threshold = uniform * (1 - 1e-6) * cumulative[-1]
     return first_row((cumulative > threshold) & (probabilities > 0))
 
@@ -119,16 +123,17 @@ def greedy_rows(setup) -> np.ndarray:
     return np.diff(np.floor(rows * setup.settings.greedy_share)) > 0
 
 
-def encode(setup, contexts, observation) -> Inputs:
-    """Network inputs of a device's (envs, size) observations, each group in its own context."""
-    encode_group = jax.vmap(setup.policy.encode, (0, None))
-    return _concatenate(
-        [encode_group(observation[part], c) for part, c in zip(setup.slices, contexts)]
-    )
+def encode(setup, env_params, observation) -> Inputs:
+    """Network inputs of a device's (envs, size) observations, each in its own context."""
+
+    def encode_one(observation, env_params):
+        return setup.policy.encode(observation, setup.env.context(env_params))
+
+    return jax.vmap(encode_one, (0, setup.param_axes(env_params)))(observation, env_params)
 
 
 def episode_sums(setup, steps: Step) -> dict[str, chex.Array]:
-    """Sums over the whole episodes that ended in a rollout, one an environment."""
+    """Sums over the whole episodes that ended in a rollout, one a group."""
     ended = steps.is_whole & (steps.terminated | steps.truncated)
     ended = ended.astype(steps.score.dtype)
     columns = {
@@ -141,10 +146,6 @@ def episode_sums(setup, steps: Step) -> dict[str, chex.Array]:
         name: jnp.stack([jnp.sum(x[:, part]) for part in setup.slices])
         for name, x in columns.items()
     }
-
-
-def _concatenate(trees):
-    return jax.tree.map(lambda *leaves: jnp.concatenate(leaves), *trees)
 
 
 def pick(log_probabilities, action):

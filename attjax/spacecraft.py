@@ -52,6 +52,8 @@ class EnvParams:
         goal_angle: largest φ that counts as pointing, rad.
         min_slew_angle, max_slew_angle: range of the initial φ, rad.
         max_steps_in_episode: time limit, agent steps, int32.
+        frameskip: torque-free RK4 steps in an agent step, int32, where spacecraft of one batch
+            differ; at most the environment's. None: the environment's.
     """
 
     inertia: chex.Array
@@ -61,6 +63,7 @@ class EnvParams:
     min_slew_angle: chex.Array
     max_slew_angle: chex.Array
     max_steps_in_episode: chex.Array
+    frameskip: chex.Array | None = None
 
 
 def default_params(frameskip: int = 20) -> EnvParams:
@@ -72,8 +75,13 @@ def default_params(frameskip: int = 20) -> EnvParams:
         goal_angle=jnp.array(np.deg2rad(0.25), float),
         min_slew_angle=jnp.array(np.deg2rad(30), float),
         max_slew_angle=jnp.array(np.deg2rad(150), float),
-        max_steps_in_episode=jnp.array(EPISODE_RK4_STEPS // (frameskip + 1), jnp.int32),
+        max_steps_in_episode=jnp.array(max_steps(frameskip), jnp.int32),
     )
+
+
+def max_steps(frameskip: int) -> int:
+    """Agent steps in an episode of 43.75 s."""
+    return EPISODE_RK4_STEPS // (frameskip + 1)
 
 
 def initial_state(key: chex.PRNGKey, params: EnvParams) -> EnvState:
@@ -136,7 +144,8 @@ def step(state: EnvState, action, params: EnvParams | None = None, frameskip: in
         state: the spacecraft before the step.
         action: integer scalar, row of the torque table (Table 1).
         params: spacecraft, the paper's by default.
-        frameskip: torque-free RK4 steps after the one with torque (static).
+        frameskip: torque-free RK4 steps after the one with torque (static); if
+            ``params.frameskip`` says how many, the most there may be.
 
     Returns:
         The state (1 + frameskip)/240 s later.
@@ -153,5 +162,6 @@ def step(state: EnvState, action, params: EnvParams | None = None, frameskip: in
         params.torque_table[action],
         params.inertia,
         frameskip,
+        params.frameskip,
     )
     return EnvState(quaternion, angular_velocity, state.time + 1)

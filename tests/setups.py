@@ -33,7 +33,6 @@ def small_attitude_setup(updates, preset=presets.PRECISE, **overrides):
 
 def fly(setup, env_params, state):
     """The learner and the steps of one rollout."""
-    contexts = [env.context(params) for env, params in zip(setup.envs, env_params)]
-    on_device = functools.partial(rollout, setup, env_params, contexts)
+    on_device = functools.partial(rollout, setup, env_params)
     out_specs = (learner.LEARNER_SPECS, PartitionSpec(None, vector.AXIS))
     return learner.on_devices(setup, on_device, (learner.LEARNER_SPECS,), out_specs)(state)

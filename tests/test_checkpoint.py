@@ -27,7 +27,7 @@ def trained(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     checkpoint.create(folder, CONFIG, overwrite=False)
     setup = assembly.setup(SETTINGS)
-    env_params = tuple(env.default_params for env in setup.envs)
+    env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(3))
     state, _ = ppo.train_block(setup, env_params, state, 2)
     with checkpoint.Saver(folder) as saver:
@@ -62,6 +62,7 @@ def test_restored_learner_is_the_saved_one_and_goes_on_bitwise(trained):
 def test_a_run_goes_on_with_another_number_of_devices(trained):
     folder, setup, env_params, state = trained
     setup = dataclasses.replace(setup, num_devices=2)
+    env_params = assembly.env_params(setup)
     template = learner.init(setup, env_params, jax.random.key(99))
     restored = checkpoint.restore_learner(folder, template)
     jax.tree.map(np.testing.assert_array_equal, restored.params, state.params)

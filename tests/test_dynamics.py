@@ -239,12 +239,36 @@ def test_the_loops_for_cpu_do_as_the_plain_scan(x64, inertia, frameskip):
     quaternion, rate, _ = random_spacecraft(37)
     start = (*quaternion.T, *rate.T)
     plain, in_line = (
-        jax.jit(jax.vmap(functools.partial(change, frameskip), (0, None, None)))(
-            start, acceleration, gyroscopic
+        jax.jit(jax.vmap(functools.partial(change, frameskip), (0, None, None, None)))(
+            start, acceleration, gyroscopic, ()
         )
         for change in (dynamics._change_by_scan, dynamics._change_in_line)
     )
     np.testing.assert_allclose(np.stack(in_line), np.stack(plain), rtol=0, atol=1e-15)
+
+
+def test_spacecraft_of_several_control_rates_share_a_program(x64):
+    """Each takes its own number of torque-free steps, and its gradients know of no others."""
+    arguments = random_spacecraft(6)
+    steps = jnp.array([0, 1, 5, 7, 19, 20])
+    inertia = jnp.asarray(LM50)
+    mixed = jax.jit(jax.vmap(dynamics.propagate, (0, 0, 0, None, None, 0)), static_argnums=4)
+    q, w = mixed(*arguments, inertia, 20, steps)
+    for row, frameskip in enumerate(steps.tolist()):
+        expected = dynamics.propagate(*(x[row] for x in arguments), inertia, frameskip)
+        np.testing.assert_allclose(q[row], expected[0], rtol=0, atol=1e-15)
+        np.testing.assert_allclose(w[row], expected[1], rtol=0, atol=1e-15)
+
+    def rate(torque, inertia, steps, frameskip):
+        q, w = arguments[0][0], arguments[1][0]
+        return dynamics.propagate(q, w, torque, inertia, frameskip, steps)[1]
+
+    gradient = jax.jacfwd(rate)
+    np.testing.assert_allclose(
+        gradient(arguments[2][0], inertia, 5, 20),
+        gradient(arguments[2][0], inertia, None, 5),
+        atol=1e-15,
+    )
 
 
 def test_gradient_through_an_agent_step_is_that_of_finite_differences(x64):

@@ -140,6 +140,24 @@ def test_all_parameters_can_be_vmapped():
     np.testing.assert_array_equal(terminated, [False, False, True])
 
 
+def test_spacecraft_of_a_batch_may_act_at_their_own_rates():
+    env, key = AttitudeEnv(frameskip=20), jax.random.key(0)
+    params = env.default_params.replace(frameskip=jnp.array([5, 20]))
+    axes = jax.tree.map(lambda _: None, env.default_params).replace(frameskip=0)
+    _, state = env.reset(key, env.default_params)
+    step = jax.jit(jax.vmap(env.step_env, (None, None, None, axes)))
+    _, after, *_ = step(key, state, 1, params)
+    periods = jax.vmap(env.context, (axes,))(params).control_period
+    for row, frameskip in enumerate((5, 20)):
+        own = AttitudeEnv(frameskip)
+        assert float(periods[row]) == pytest.approx(own.control_period)
+        _, expected, *_ = own.step_env(key, state, 1, own.default_params)
+        np.testing.assert_allclose(after.quaternion[row], expected.quaternion, atol=1e-7)
+        np.testing.assert_allclose(
+            after.angular_velocity[row], expected.angular_velocity, rtol=1e-5, atol=1e-9
+        )
+
+
 def test_works_in_float64(x64):
     env = AttitudeEnv(frameskip=20)
     key, params = jax.random.key(0), env.default_params

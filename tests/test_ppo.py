@@ -9,20 +9,19 @@ from jax.sharding import PartitionSpec
 from probes import Probe
 from setups import fly, settings, small_attitude_setup
 
-from attjax import assembly, learner, ppo, presets, vector
+from attjax import AttitudeEnv, assembly, learner, ppo, presets, vector
 from attjax.networks import Policy
 
 
-def train(setup, seed=0):
-    env_params = tuple(env.default_params for env in setup.envs)
-    state = learner.init(setup, env_params, jax.random.key(seed))
+def train(setup, env_params):
+    state = learner.init(setup, env_params, jax.random.key(0))
     return ppo.train_block(setup, env_params, state, setup.settings.num_updates)
 
 
 def train_probe(probe, updates=60, num_devices=1, **overrides):
     policy = Policy(hidden_sizes=(32, 32), num_actions=2)
-    setup = learner.Setup((probe,), policy, settings(updates, **overrides), num_devices)
-    state, _ = train(setup)
+    setup = learner.Setup(probe, policy, settings(updates, **overrides), num_devices=num_devices)
+    state, _ = train(setup, probe.default_params)
 
     def value(*observation):
         return float(policy.value(state.params, jnp.array([observation], float))[0])
@@ -142,7 +141,7 @@ def test_entropy_bonus_is_what_its_weight_takes_off_the_loss():
     setup = small_attitude_setup(1)
     env_params = assembly.env_params(setup)
     params = learner.init(setup, env_params, jax.random.key(0)).params
-    context = setup.envs[0].context(env_params[0])
+    context = AttitudeEnv(5).context(AttitudeEnv(5).default_params)
     observation = jnp.zeros((5, 11)).at[:, 8].set(jnp.linspace(0, 0.3, 5))
     inputs = jax.vmap(setup.policy.encode, (0, None))(observation, context)
     old = -jnp.log(19.0) * jnp.ones(5)
@@ -171,7 +170,8 @@ def test_divergence_names_its_first_update(spoiled):
 
 
 def test_healthy_runs_do_not_diverge():
-    _, metrics = train(small_attitude_setup(2))
+    setup = small_attitude_setup(2)
+    _, metrics = train(setup, assembly.env_params(setup))
     assert {int(update) for update in metrics["diverged"].values()} == {-1}
 
 
@@ -217,8 +217,7 @@ def on_samples(setup, env_params, state, steps):
     """Adam's moments after an update on given steps: the gradient, up to constant factors."""
 
     def on_device(state, steps):
-        contexts = [env.context(params) for env, params in zip(setup.envs, env_params)]
-        samples = ppo.with_advantages(setup, contexts, state, steps)
+        samples = ppo.with_advantages(setup, env_params, state, steps)
         return ppo.optimize(setup, state, samples)[0].optimizer
 
     split = PartitionSpec(None, vector.AXIS)

@@ -10,22 +10,21 @@ from setups import fly, small_attitude_setup
 
 import attjax
 from attjax import assembly, learner, ppo, presets
-from attjax.rollout import episode_sums, greedy_rows, sample
+from attjax.rollout import encode, episode_sums, greedy_rows, sample
 
 
 def test_spacecraft_are_shared_out_among_the_control_rates():
     setup = small_attitude_setup(1, frameskips=(5, 7, 10, 14, 20))
     sizes = [group.stop - group.start for group in setup.slices]
     assert sum(sizes) == 64 and set(sizes) == {12, 13}
-    assert [env.frameskip for env in setup.envs] == [5, 7, 10, 14, 20]
     env_params = assembly.env_params(setup)
-    contexts = [env.context(p) for env, p in zip(setup.envs, env_params)]
-    discounts = ppo.discounts(setup, contexts)
-    for env, group in zip(setup.envs, setup.slices):
-        expected = 0.995 ** (env.control_period / 0.025)
-        np.testing.assert_allclose(discounts[group], expected, rtol=1e-6)
-        features = setup.policy.encode(jnp.zeros(11), env.context(env.default_params)).features
-        assert float(features[-2]) == pytest.approx(10 * env.control_period)
+    discounts = ppo.discounts(setup, env_params)
+    features = encode(setup, env_params, jnp.zeros((64, 11))).features
+    for frameskip, group in zip((5, 7, 10, 14, 20), setup.slices):
+        assert set(env_params.frameskip[group].tolist()) == {frameskip}
+        period = (1 + frameskip) / 240
+        np.testing.assert_allclose(discounts[group], 0.995 ** (period / 0.025), rtol=1e-6)
+        np.testing.assert_allclose(features[group, -2], 10 * period, rtol=1e-6)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.125])
@@ -75,10 +74,11 @@ def test_only_whole_episodes_count_in_the_metrics():
 def test_training_episodes_are_capped_in_agent_steps():
     """The slow rates keep their 43.75 s, the fast ones are cut; the paper's are untouched."""
     setup = small_attitude_setup(1, frameskips=(5, 7, 10, 14, 20), max_episode_steps=700)
-    limits = [int(params.max_steps_in_episode) for params in assembly.env_params(setup)]
-    assert limits == [700, 700, 700, 700, 500]
+    limits = assembly.env_params(setup).max_steps_in_episode
+    for limit, group in zip([700, 700, 700, 700, 500], setup.slices):
+        assert set(limits[group].tolist()) == {limit}
     paper = assembly.setup(presets.PAPER)
-    assert [int(p.max_steps_in_episode) for p in assembly.env_params(paper)] == [500]
+    assert assembly.env_params(paper).max_steps_in_episode == 500
 
 
 def test_staggered_episodes_start_at_random_times():
@@ -95,7 +95,8 @@ def test_staggered_episodes_start_at_random_times():
 def test_sampled_actions_follow_their_probabilities_and_never_the_mask():
     probabilities = jnp.array([0.0, 0.1, 0.0, 0.6, 0.3, 0.0])
     log_probabilities = jnp.broadcast_to(jnp.log(probabilities)[:, None], (6, 200_000))
-    counts = jnp.bincount(sample(jax.random.key(0), log_probabilities), length=6)
+    uniform = jax.random.uniform(jax.random.key(0), (200_000,))
+    counts = jnp.bincount(sample(log_probabilities, uniform), length=6)
     # Five standard deviations of a frequency.
     np.testing.assert_allclose(counts / 200_000, probabilities, atol=5 * 0.5 / 200_000**0.5)
     assert counts[jnp.array([0, 2, 5])].sum() == 0
@@ -113,7 +114,7 @@ def test_every_spacecraft_and_device_draws_its_own_numbers(num_devices):
     assert len(np.unique(steps.action, axis=1).T) == 64
 
 
-def test_devices_hold_the_environments_of_their_part():
+def test_devices_hold_the_control_rates_of_their_part():
     """Row i of a device steps with the control period that the policy is told."""
     setup = dataclasses.replace(small_attitude_setup(1, near_goal_share=0.0), num_devices=2)
     env_params = assembly.env_params(setup)
@@ -121,9 +122,9 @@ def test_devices_hold_the_environments_of_their_part():
     before = state.states
     _, steps = fly(setup, env_params, state)
     first = jax.tree.map(lambda x: x[0], steps)
-    for group, env in enumerate(setup.envs):
+    for group, frameskip in enumerate(setup.settings.frameskips):
         rows = np.flatnonzero(np.tile(setup.group_of_row, 2) == group)
         start, action = jax.tree.map(lambda x, rows=rows: x[rows], (before, first.action))
         step = jax.vmap(attjax.step, (0, 0, None, None))
-        after = step(start, action, env.default_params, env.frameskip)
+        after = step(start, action, None, frameskip)
         np.testing.assert_allclose(first.final_observation[rows, :4], after.quaternion, atol=1e-6)
