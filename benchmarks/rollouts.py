@@ -14,12 +14,13 @@ from attjax import AttitudeEnv, vector
 FRAMESKIP = 20
 ENV = AttitudeEnv(FRAMESKIP)
 AGENT_STEPS_A_CALL = 2**21
-MAX_STEPS_A_CALL = 1000
+STEPS_A_CALL = (16, 1000)
+"""Fewest and most agent steps a spacecraft in one call; a short flight pays for its start."""
 
 
 def steps_a_call(num_envs: int) -> int:
     """Agent steps of each spacecraft in one call."""
-    return max(4, min(MAX_STEPS_A_CALL, AGENT_STEPS_A_CALL // num_envs))
+    return min(max(AGENT_STEPS_A_CALL // num_envs, STEPS_A_CALL[0]), STEPS_A_CALL[1])
 
 
 def fused(num_envs: int, num_devices: int = 1) -> Flight:

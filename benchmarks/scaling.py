@@ -22,7 +22,7 @@ from attjax import cli
 NUM_ENVS = (2048, 8192, 32768, 131072, 524288, 1048576)
 NETWORKS = ((400, 300), (64, 64))
 REPEAT_S = 0.3
-TRAINING_BLOCKS = 3
+TRAINING_BLOCKS = 5
 MEBIBYTE = 2**20
 SPEED_COLUMNS = ("\ncores", "start\n(s)", "compile\n(s)", "agent-\nsteps/s", "\nrange")
 MEMORY_NOTE = "Peak memory is the whole process's, with Python, JAX and the compiler."
