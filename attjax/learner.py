@@ -7,6 +7,7 @@ from typing import Any
 
 import chex
 import jax
+import jax.flatten_util
 import jax.numpy as jnp
 import numpy as np
 import optax
@@ -103,7 +104,11 @@ LEARNER_SPECS = Learner(SHARED, SHARED, SPLIT, SPLIT, SPLIT, SPLIT, SHARED, SHAR
 
 
 def optimizer(settings: Settings) -> optax.GradientTransformation:
-    """Adam, annealed linearly over the whole run, with optional gradient clipping."""
+    """Adam, annealed linearly over the whole run, with optional gradient clipping.
+
+    It is given a network's gradient as one vector: dozens of small arrays cost more to start on
+    than to work through.
+    """
     gradient_steps = settings.num_updates * settings.passes * settings.minibatches
     schedule = optax.linear_schedule(
         settings.learning_rate, settings.final_learning_rate, gradient_steps
@@ -111,8 +116,7 @@ def optimizer(settings: Settings) -> optax.GradientTransformation:
     clip = optax.identity()
     if settings.max_gradient_norm > 0:
         clip = optax.clip_by_global_norm(settings.max_gradient_norm)
-    # As one vector: dozens of small arrays cost more to start on than to work through.
-    return optax.flatten(optax.chain(clip, optax.adam(schedule)))
+    return optax.chain(clip, optax.adam(schedule))
 
 
 def entropy_coefficient(settings: Settings, update) -> chex.Array:
@@ -140,7 +144,10 @@ def _init_on_device(setup, env_params, key):
     params = setup.policy.init(policy_key, value_key, observation[0], context)
     return Learner(
         params=params,
-        optimizer={name: optimizer(setup.settings).init(p) for name, p in params.items()},
+        optimizer={
+            name: optimizer(setup.settings).init(jax.flatten_util.ravel_pytree(p)[0])
+            for name, p in params.items()
+        },
         states=states,
         observation=observation,
         score=jnp.zeros(setup.envs_per_device, observation.dtype),

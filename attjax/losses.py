@@ -59,6 +59,15 @@ def clipped_policy_loss(log_probability, old_log_probability, advantage, clip):
     return -jnp.mean(objective), diagnostics
 
 
+def pick(log_probabilities, action):
+    """(samples,) log probability of each taken action, from those of all (actions, samples).
+
+    A masked sum: gathers and their gradients, scatters, do not vectorise.
+    """
+    is_taken = jnp.arange(len(log_probabilities))[:, None] == action
+    return jnp.sum(jnp.where(is_taken, log_probabilities, 0.0), axis=0)
+
+
 def entropy(log_probabilities: chex.Array) -> chex.Array:
     """(samples,) entropy, nats, of categorical distributions (actions, samples)."""
     return -jnp.sum(jnp.exp(log_probabilities) * log_probabilities, axis=0)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import vector
+from attjax import losses, vector
 from attjax.learner import Learner, params_of
 from attjax.networks import Inputs
 
@@ -48,7 +48,7 @@ def rollout(setup, env_params, learner) -> tuple[Learner, Step]:
         most_probable = first_row(log_probabilities == jnp.max(log_probabilities, axis=0))
         action = jnp.where(greedy, most_probable, sampled)
         learner, results = fly(setup, env_params, learner, action, keys)
-        log_probability = pick(log_probabilities, action)
+        log_probability = losses.pick(log_probabilities, action)
         return learner, Step(inputs, action, log_probability, **results)
 
     # Drawn all at once: a small draw costs as much to start as to make.
@@ -146,12 +146,3 @@ def episode_sums(setup, steps: Step) -> dict[str, chex.Array]:
         name: jnp.stack([jnp.sum(x[:, part]) for part in setup.slices])
         for name, x in columns.items()
     }
-
-
-def pick(log_probabilities, action):
-    """(samples,) log probability of each taken action, from those of all (actions, samples).
-
-    A masked sum: gathers and their gradients, scatters, do not vectorise.
-    """
-    is_taken = jnp.arange(len(log_probabilities))[:, None] == action
-    return jnp.sum(jnp.where(is_taken, log_probabilities, 0.0), axis=0)

@@ -13,14 +13,14 @@ LAYERS = [
     {"controllers"},
     {"networks", "losses"},
     {"learner", "evaluation"},
-    {"rollout"},
+    {"rollout", "descent"},
     {"ppo"},
     {"presets", "assembly"},
     {"progress", "report", "cli"},
     {"checkpoint"},
     {"plots"},
 ]
-LEARNING = {"networks", "losses", "learner", "rollout", "ppo"}
+LEARNING = {"networks", "losses", "learner", "rollout", "descent", "ppo"}
 SPACECRAFT = {"spacecraft", "reward", "env"}
 FOLDER = Path(attjax.__file__).parent
 

@@ -9,7 +9,7 @@ from jax.sharding import PartitionSpec
 from probes import Probe
 from setups import fly, settings, small_attitude_setup
 
-from attjax import AttitudeEnv, assembly, learner, ppo, presets, vector
+from attjax import AttitudeEnv, assembly, descent, learner, ppo, presets, vector
 from attjax.networks import Policy
 
 
@@ -145,9 +145,9 @@ def test_entropy_bonus_is_what_its_weight_takes_off_the_loss():
     observation = jnp.zeros((5, 11)).at[:, 8].set(jnp.linspace(0, 0.3, 5))
     inputs = jax.vmap(setup.policy.encode, (0, None))(observation, context)
     old = -jnp.log(19.0) * jnp.ones(5)
-    sample = ppo.Sample(inputs, jnp.zeros(5, int), old, jnp.arange(5.0), jnp.ones(5))
-    plain, metrics = ppo.loss(setup, params, sample, 0.0)
-    rewarded, _ = ppo.loss(setup, params, sample, 0.5)
+    sample = descent.Sample(inputs, jnp.zeros(5, int), old, jnp.arange(5.0), jnp.ones(5))
+    plain, metrics = descent.loss(setup, params, sample, 0.0)
+    rewarded, _ = descent.loss(setup, params, sample, 0.5)
     assert metrics["entropy"] == pytest.approx(np.log(19), rel=1e-2)
     assert plain - rewarded == pytest.approx(0.5 * float(metrics["entropy"]), rel=1e-5)
 
@@ -177,13 +177,13 @@ def test_healthy_runs_do_not_diverge():
 
 @pytest.mark.parametrize("count", [1, 2, 1000, 4096, 300_000])
 def test_random_order_is_a_permutation_that_mixes(count):
-    order = np.asarray(jax.jit(ppo.random_order, static_argnums=1)(jax.random.key(0), count))
+    order = np.asarray(jax.jit(descent.random_order, static_argnums=1)(jax.random.key(0), count))
     np.testing.assert_array_equal(np.sort(order), np.arange(count))
     if count >= 1000:
         # The rank correlation of a random order has standard deviation 1/sqrt(count − 1).
         correlation = np.corrcoef(order, np.arange(count))[0, 1]
         assert abs(correlation) < 5 / np.sqrt(count - 1)
-        assert not np.array_equal(order, ppo.random_order(jax.random.key(1), count))
+        assert not np.array_equal(order, descent.random_order(jax.random.key(1), count))
 
 
 def test_a_pass_takes_every_sample_once_and_whole():
@@ -191,7 +191,7 @@ def test_a_pass_takes_every_sample_once_and_whole():
     numbers = jnp.arange(48)
     samples = {"plain": numbers, "wide": jnp.stack([numbers, -numbers], axis=1)}
     order = jnp.array([[3, 0, 5], [1, 4, 2]])
-    taken = [jax.tree.map(lambda x, o=o: ppo.take_blocks(x, 6, o), samples) for o in order]
+    taken = [jax.tree.map(lambda x, o=o: descent.take_blocks(x, 6, o), samples) for o in order]
     assert taken[0]["plain"].tolist() == [*range(24, 32), *range(8), *range(40, 48)]
     np.testing.assert_array_equal(taken[1]["wide"][:, 1], -taken[1]["plain"])
     both = np.concatenate([part["plain"] for part in taken])
@@ -218,7 +218,7 @@ def on_samples(setup, env_params, state, steps):
 
     def on_device(state, steps):
         samples = ppo.with_advantages(setup, env_params, state, steps)
-        return ppo.optimize(setup, state, samples)[0].optimizer
+        return descent.optimize(setup, state, samples)[0].optimizer
 
     split = PartitionSpec(None, vector.AXIS)
     specs = (learner.LEARNER_SPECS, split)

@@ -1,0 +1,143 @@
+"""The gradient steps of an update: shuffled minibatches, the clipped loss, Adam."""
+
+import math
+from typing import Any
+
+import chex
+import jax
+import jax.numpy as jnp
+import optax
+from flax import struct
+from jax.flatten_util import ravel_pytree
+
+from attjax import losses, vector
+from attjax.learner import Learner, Setup, entropy_coefficient, optimizer
+from attjax.networks import Inputs
+
+MAX_INDEX_BITS = 18
+
+SHUFFLED_TOGETHER = 8
+"""Most neighbouring spacecraft whose samples stay together in a shuffle."""
+
+
+@struct.dataclass
+class Sample:
+    """What the losses need of a step; fields are (samples, ...)."""
+
+    inputs: Inputs
+    action: chex.Array
+    log_probability: chex.Array
+    advantage: chex.Array
+    target: chex.Array
+
+
+def optimize(setup, learner, samples: Sample) -> tuple[Learner, dict]:
+    """N passes of shuffled minibatches. Returns the learner and the losses' means.
+
+    Each device shuffles its own samples; a minibatch takes the same number of each device's.
+    What is shuffled are blocks of neighbours, up to SHUFFLED_TOGETHER spacecraft at one time:
+    samples independent of each other that memory gives four times as fast as single ones.
+    """
+    settings = setup.settings
+    transformation = optimizer(settings)
+    per_device = settings.minibatch_size // setup.num_devices
+    block = math.gcd(setup.envs_per_device, per_device, SHUFFLED_TOGETHER)
+    num_blocks = len(samples.action) // block
+    entropy_weight = entropy_coefficient(settings, learner.update)
+
+    def gradient_step(carry, minibatch):
+        params, state = carry
+        chosen, advantage = minibatch
+        sample = jax.tree.map(lambda x: take_blocks(x, num_blocks, chosen), samples)
+        sample = sample.replace(advantage=advantage)
+        gradients, metrics = jax.grad(loss, argnums=1, has_aux=True)(
+            setup, params, sample, entropy_weight
+        )
+        return _descend(transformation, params, state, gradients), metrics
+
+    def one_pass(carry, key):
+        used = settings.minibatches * (per_device // block)
+        order = random_order(key, num_blocks)[:used].reshape(settings.minibatches, -1)
+        advantage = take_blocks(samples.advantage, num_blocks, order)
+        advantage = advantage.reshape(settings.minibatches, -1)
+        if settings.normalize_advantage:
+            advantage = losses.standardize(advantage, _minibatch_means)
+        return jax.lax.scan(gradient_step, carry, (order, advantage))
+
+    key, pass_key = jax.random.split(learner.key)
+    pass_key = jax.random.fold_in(pass_key, jax.lax.axis_index(vector.AXIS))
+    (params, state), metrics = jax.lax.scan(
+        one_pass,
+        (learner.params, learner.optimizer),
+        jax.random.split(pass_key, settings.passes),
+    )
+    learner = learner.replace(params=params, optimizer=state, key=key)
+    return learner, jax.tree.map(jnp.mean, metrics)
+
+
+def take_blocks(x, num_blocks, chosen):
+    """Some of the equal blocks that the first axis of x is made of, one after another."""
+    flat = jnp.take(x.reshape(num_blocks, -1), chosen, axis=0, mode="clip")
+    return flat.reshape(-1, *x.shape[1:])
+
+
+def random_order(key, count: int) -> chex.Array:
+    """(count,) a random permutation of range(count).
+
+    Sorts words that end in the index and begin with random bits: eight times as fast on CPU as
+    ``jax.random.permutation``. The few neighbours with equal random bits keep their order; where
+    the index leaves too few random bits, it is ``jax.random.permutation`` after all.
+    """
+    index_bits = max(count - 1, 1).bit_length()
+    if index_bits > MAX_INDEX_BITS:
+        return jax.random.permutation(key, count)
+    index_mask = jnp.uint32((1 << index_bits) - 1)
+    words = jax.random.bits(key, (count,), jnp.uint32)
+    words = (words & ~index_mask) | jnp.arange(count, dtype=jnp.uint32)
+    return jnp.sort(words) & index_mask
+
+
+def _minibatch_means(x):
+    """Means over each row of x, a minibatch, and over the devices that share it."""
+    return jax.lax.pmean(jnp.mean(x, axis=1, keepdims=True), vector.AXIS)
+
+
+def _descend(transformation, params, state, gradients):
+    """The optimizer's step along the gradients' mean over the devices, in a single exchange."""
+    vectors = {name: ravel_pytree(tree)[0] for name, tree in gradients.items()}
+    joined, part = ravel_pytree(vectors)
+    vectors = part(jax.lax.pmean(joined, vector.AXIS))
+    moved, states = {}, {}
+    for name, tree in params.items():
+        move, states[name] = transformation.update(vectors[name], state[name])
+        _, restore = ravel_pytree(tree)
+        moved[name] = optax.apply_updates(tree, restore(move))
+    return moved, states
+
+
+def loss(
+    setup: Setup, params: dict, sample: Sample, entropy_weight
+) -> tuple[chex.Array, dict[str, Any]]:
+    """Clipped objective with entropy bonus plus the value's mean squared error.
+
+    The two networks share no parameters, so the sum trains each on its own loss.
+    """
+    policy = setup.policy
+    log_probabilities = policy.log_probabilities(params, sample.inputs)
+    policy_loss, diagnostics = losses.clipped_policy_loss(
+        losses.pick(log_probabilities, sample.action),
+        sample.log_probability,
+        sample.advantage,
+        setup.settings.clip,
+    )
+    entropy = jnp.mean(losses.entropy(log_probabilities))
+    residual = policy.value(params, sample.inputs.features) - sample.target
+    value_loss = jnp.mean(residual**2)
+    metrics = {
+        "policy_loss": policy_loss,
+        "value_loss": value_loss,
+        "entropy": entropy,
+        "explained_variance": 1 - jnp.var(residual) / (jnp.var(sample.target) + 1e-12),
+        **diagnostics,
+    }
+    return policy_loss - entropy_weight * entropy + value_loss, metrics
