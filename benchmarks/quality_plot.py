@@ -8,7 +8,7 @@ from attjax.report import PAPER_TABLE_2
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
-from matplotlib.ticker import LogLocator, ScalarFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 PAPER_ERROR = PAPER_TABLE_2["terminal", "error_deg"][0]
 STAR = {"markersize": 11, "markeredgecolor": "black"}
@@ -33,6 +33,7 @@ def plot(curves: dict, plateau: float, path: Path) -> None:
     returns.set_ylabel("return at 11.43 Hz, mean (Eq. 12–13)")
     returns.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     returns.xaxis.set_major_formatter(ScalarFormatter())
+    returns.xaxis.set_minor_formatter(NullFormatter())
     figure.suptitle("The greedy policy during training")
     figure.legend(loc="outside lower center", ncols=2)
     figure.savefig(path, dpi=150)
