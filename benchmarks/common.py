@@ -21,7 +21,7 @@ from rich.table import Table
 from attjax import cli
 
 PACKAGES = ("jax", "jaxlib", "numpy", "numba", "bsk")
-MIN_TABLE_WIDTH = 100
+MIN_TABLE_WIDTH = 120
 
 
 @dataclasses.dataclass(frozen=True)
