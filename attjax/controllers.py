@@ -7,7 +7,7 @@ action whose impulse comes nearest to the one that leads there.
 import chex
 import jax.numpy as jnp
 
-from attjax import dynamics
+from attjax import dynamics, rigid_body
 from attjax import observation as observations
 from attjax import quaternion as quaternions
 from attjax.context import Context
@@ -41,7 +41,7 @@ def phase_plane(observation: chex.Array, context: Context) -> chex.Array:
         The action, an integer scalar.
     """
     angle = quaternions.rotation_vector(observation[observations.QUATERNION])
-    momentum = jnp.sum(jnp.abs(dynamics.angular_momentum(context.inertia, angle)))
+    momentum = jnp.sum(jnp.abs(rigid_body.angular_momentum(context.inertia, angle)))
     braking = jnp.sqrt(2 * BRAKING_MARGIN * average_torque(context) / jnp.maximum(momentum, 1e-12))
     gain = jnp.minimum(braking, TERMINAL_GAIN / context.control_period)
     return nearest_action(-gain * angle, observation, context)
@@ -75,7 +75,7 @@ def nearest_action(wanted_rate, observation, context: Context) -> chex.Array:
     rate = jnp.sqrt(jnp.sum(wanted_rate**2))
     scale = jnp.minimum(1.0, RATE_MARGIN * context.rate_limit / jnp.maximum(rate, 1e-12))
     change = wanted_rate * scale - observation[observations.ANGULAR_VELOCITY]
-    impulse = dynamics.angular_momentum(context.inertia, change)
+    impulse = rigid_body.angular_momentum(context.inertia, change)
     missing = context.torque_table * dynamics.INTEGRATION_STEP - impulse
     return jnp.argmin(jnp.sum(missing**2, axis=-1))
 

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from attjax import quaternion as quaternions
+from attjax import rigid_body
 from attjax.kernel import one_loop
 
 INTEGRATION_STEP = 1 / 240
@@ -102,53 +103,8 @@ def rate_after_impulse(angular_velocity, torque, inertia):
     """
     if inertia.ndim == 1:
         return angular_velocity + torque / inertia * INTEGRATION_STEP
-    acceleration = jnp.matmul(torque, _inverse(inertia), precision="highest")
+    acceleration = jnp.matmul(torque, rigid_body.inverse(inertia), precision="highest")
     return angular_velocity + acceleration * INTEGRATION_STEP
-
-
-def angular_momentum(inertia, angular_velocity):
-    """I ω, N m s, for an inertia (3,) or (3, 3) and (..., 3) angular velocities."""
-    if inertia.ndim == 1:
-        return inertia * angular_velocity
-    return jnp.matmul(angular_velocity, inertia, precision="highest")
-
-
-def principal_moments(inertia):
-    """(3,) principal moments, kg m², of an inertia (3,) or (3, 3)."""
-    return inertia if inertia.ndim == 1 else jnp.linalg.eigvalsh(inertia)
-
-
-def peak_rate(angular_velocity, inertia):
-    """Largest ‖ω‖ that the spacecraft comes to while it coasts on without torque.
-
-    Coasting conserves 2T = ω·Iω and H = ‖Iω‖. In the principal axes, each
-    (Iᵢ − I_min)(I_max − Iᵢ) ≥ 0, so ‖ω‖² ≤ (2T (I_min + I_max) − H²) / (I_min I_max), with
-    equality where the rate about the intermediate axis passes through zero.
-
-    Args:
-        angular_velocity: (..., 3) body frame, rad/s.
-        inertia: (3,) or (3, 3), kg m².
-
-    Returns:
-        (...) rad/s.
-
-    Example: a turn about the intermediate axis is unstable and can gain 23 %.
-        >>> round(peak_rate(jnp.array([0.0, 0.0, 0.4]), jnp.array(LM50_INERTIA)).item(), 4)
-        0.4915
-    """
-    squares = angular_velocity * jnp.matmul(
-        angular_velocity, peak_rate_form(inertia), precision="highest"
-    )
-    return jnp.sqrt(jnp.sum(squares, axis=-1))
-
-
-def peak_rate_form(inertia):
-    """(3, 3) matrix A, dimensionless, of an inertia (3,) or (3, 3): peak rate² = ω·Aω."""
-    moments = principal_moments(inertia)
-    low, high = jnp.min(moments), jnp.max(moments)
-    tensor = jnp.diag(inertia) if inertia.ndim == 1 else inertia
-    squared = jnp.matmul(tensor, tensor, precision="highest")
-    return ((low + high) * tensor - squared) / (low * high)
 
 
 def _checked(quaternion, angular_velocity, torque, inertia):
@@ -167,19 +123,12 @@ def _euler_terms(inertia, torque):
     if inertia.ndim == 1:
         i1, i2, i3 = inertia
         return ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3), tuple(torque / inertia)
-    inverse = _inverse(inertia)
+    inverse = rigid_body.inverse(inertia)
     cross = jnp.array(_LEVI_CIVITA, inertia.dtype)
     factors = -jnp.einsum("il,ljm,mk->ijk", inverse, cross, inertia, precision="highest")
     factors = factors + factors.swapaxes(1, 2)
     terms = [[axis[j, k] / (2 if j == k else 1) for j, k in PRODUCTS] for axis in factors]
     return sum(map(tuple, terms), ()), tuple(jnp.matmul(inverse, torque, precision="highest"))
-
-
-def _inverse(inertia):
-    """Inverse of a symmetric 3x3 matrix, by the cross products of its rows."""
-    a, b, c = inertia
-    adjugate = jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
-    return adjugate / jnp.sum(a * adjugate[0])
 
 
 def _gyroscopic_acceleration(angular_velocity, gyroscopic):

@@ -7,7 +7,7 @@ import chex
 import jax
 import jax.numpy as jnp
 
-from attjax import dynamics, spacecraft, spaces
+from attjax import dynamics, rigid_body, spacecraft, spaces
 from attjax import observation as observations
 from attjax import quaternion as quaternions
 from attjax.context import Context
@@ -148,7 +148,7 @@ class AttitudeEnv:
 
         Coasting can raise ‖ω‖ at constant energy by at most √(I_max/I_min).
         """
-        moments = dynamics.principal_moments(params.inertia)
+        moments = rigid_body.principal_moments(params.inertia)
         kick = jnp.max(jnp.abs(params.torque_table)) * dynamics.INTEGRATION_STEP / jnp.min(moments)
         rate = (params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))
         one = jnp.ones_like(rate)

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import dynamics
+from attjax import dynamics, rigid_body
 from attjax import observation as observations
 from attjax.context import Context
 
@@ -174,7 +174,7 @@ def rate_mask(observation: chex.Array, context: Context, margin: float) -> chex.
         (actions,) bool.
     """
     angular_velocity = observation[observations.ANGULAR_VELOCITY]
-    form = dynamics.peak_rate_form(context.inertia)
+    form = rigid_body.peak_rate_form(context.inertia)
     at_rest = jnp.zeros_like(angular_velocity)
     impulse = dynamics.rate_after_impulse(at_rest, context.torque_table, context.inertia)
     gradient = jnp.matmul(form, angular_velocity, precision="highest")

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import jax.test_util
 import numpy as np
 import pytest
+from bodies import LM50, random_spacecraft, rotated_inertia
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -14,7 +15,6 @@ from attjax import dynamics
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
-LM50 = np.array(dynamics.LM50_INERTIA)
 NO_TORQUE = np.zeros(3)
 START = np.array([0.1, -0.5, 0.3, 0.8, 0.2, -0.3, 0.25])  # q (made unit below), ω
 START[:4] /= np.linalg.norm(START[:4])
@@ -45,11 +45,6 @@ def integrate(start, steps, dt, torque=NO_TORQUE, inertia=LM50):
 
     state = (jnp.asarray(start[:4]), jnp.asarray(start[4:]))
     return np.concatenate(jax.lax.fori_loop(0, steps, body, state))
-
-
-def rotated_inertia():
-    rotation = Rotation.from_rotvec([0.4, -0.7, 0.2]).as_matrix()
-    return rotation @ np.diag(LM50) @ rotation.T
 
 
 @pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
@@ -153,31 +148,6 @@ def test_rate_after_impulse_is_the_integrated_one_to_first_order(x64, inertia):
         np.testing.assert_allclose(rate - START[4:], exact - coasted, atol=1e-4)
 
 
-@pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
-def test_peak_rate_is_the_largest_of_a_long_coast(x64, inertia):
-    rng = np.random.default_rng(4)
-    for _ in range(5):
-        w = rng.normal(size=3)
-        w *= 0.4 / np.linalg.norm(w)
-        tensor = np.diag(inertia) if np.ndim(inertia) == 1 else inertia
-        coast = solve_ivp(
-            lambda _, w, tensor=tensor: np.linalg.solve(tensor, -np.cross(w, tensor @ w)),
-            (0, 300), w, "DOP853", t_eval=np.arange(0, 300, 0.02), rtol=1e-11, atol=1e-13,
-        )  # fmt: skip
-        rates = np.linalg.norm(coast.y, axis=0)
-        peak = float(dynamics.peak_rate(jnp.asarray(w), jnp.asarray(inertia)))
-        assert rates.max() <= peak * (1 + 1e-8)
-        assert peak == pytest.approx(rates.max(), rel=1e-5)
-
-
-def test_peak_rate_of_steady_spins_and_of_a_sphere():
-    inertia = jnp.array(LM50)
-    spins = 0.3 * jnp.eye(3)
-    expected = [0.3, 0.3, 0.3 * np.sqrt(0.797 * (0.872 + 0.115 - 0.797) / (0.872 * 0.115))]
-    np.testing.assert_allclose(dynamics.peak_rate(spins, inertia), expected, rtol=1e-6)
-    np.testing.assert_allclose(dynamics.peak_rate(spins, jnp.full(3, 0.4)), 0.3, rtol=1e-6)
-
-
 @pytest.mark.parametrize("frameskip", [5, 20])
 def test_float32_stays_close_to_float64(frameskip):
     """200 sequences of 500 random actions."""
@@ -222,13 +192,6 @@ def test_wrong_shapes_and_mixed_types_are_refused():
         dynamics.rk4_step(q, w, torque, jnp.ones((3, 2)))
     with pytest.raises(AssertionError, match="type"):
         dynamics.rk4_step(q, w.astype(jnp.float16), torque, inertia)
-
-
-def random_spacecraft(count):
-    rng = np.random.default_rng(0)
-    quaternion = Rotation.random(count, random_state=0).as_quat()
-    rate, torque = rng.uniform(-0.3, 0.3, (2, count, 3))
-    return [jnp.asarray(x, float) for x in (quaternion, rate, torque)]
 
 
 @pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])

@@ -6,7 +6,7 @@ from pathlib import Path
 import attjax
 
 LAYERS = [
-    {"settings", "quaternion", "context", "spaces", "kernel", "vector"},
+    {"settings", "quaternion", "context", "spaces", "rigid_body", "kernel", "vector"},
     {"dynamics"},
     {"spacecraft", "reward", "observation"},
     {"env"},

@@ -3,7 +3,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, dynamics, networks, observation, spacecraft
+from attjax import AttitudeEnv, dynamics, networks, observation, rigid_body, spacecraft
 from attjax.networks import Inputs, Policy
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
@@ -80,7 +80,7 @@ def test_no_policy_under_the_mask_passes_the_limit(frameskip, reckless):
             after = dynamics.rate_after_impulse(
                 state.angular_velocity, context.torque_table, context.inertia
             )
-            wish = dynamics.peak_rate(after, context.inertia) + 1e-3 * wish
+            wish = rigid_body.peak_rate(after, context.inertia) + 1e-3 * wish
         state = spacecraft.step(
             state, jnp.argmax(jnp.where(allowed, wish, -1.0)), params, frameskip
         )

@@ -1,0 +1,55 @@
+"""What a spacecraft's inertia alone says of its motion."""
+
+import jax.numpy as jnp
+
+
+def inverse(inertia):
+    """Inverse of a symmetric 3x3 matrix, by the cross products of its rows."""
+    a, b, c = inertia
+    adjugate = jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
+    return adjugate / jnp.sum(a * adjugate[0])
+
+
+def angular_momentum(inertia, angular_velocity):
+    """I ω, N m s, for an inertia (3,) or (3, 3) and (..., 3) angular velocities."""
+    if inertia.ndim == 1:
+        return inertia * angular_velocity
+    return jnp.matmul(angular_velocity, inertia, precision="highest")
+
+
+def principal_moments(inertia):
+    """(3,) principal moments, kg m², of an inertia (3,) or (3, 3)."""
+    return inertia if inertia.ndim == 1 else jnp.linalg.eigvalsh(inertia)
+
+
+def peak_rate(angular_velocity, inertia):
+    """Largest ‖ω‖ that the spacecraft comes to while it coasts on without torque.
+
+    Coasting conserves 2T = ω·Iω and H = ‖Iω‖. In the principal axes, each
+    (Iᵢ − I_min)(I_max − Iᵢ) ≥ 0, so ‖ω‖² ≤ (2T (I_min + I_max) − H²) / (I_min I_max), with
+    equality where the rate about the intermediate axis passes through zero.
+
+    Args:
+        angular_velocity: (..., 3) body frame, rad/s.
+        inertia: (3,) or (3, 3), kg m².
+
+    Returns:
+        (...) rad/s.
+
+    Example: a turn about the intermediate axis is unstable and can gain 23 %.
+        >>> round(peak_rate(jnp.array([0.0, 0.0, 0.4]), jnp.array([0.872, 0.115, 0.797])).item(), 4)
+        0.4915
+    """
+    squares = angular_velocity * jnp.matmul(
+        angular_velocity, peak_rate_form(inertia), precision="highest"
+    )
+    return jnp.sqrt(jnp.sum(squares, axis=-1))
+
+
+def peak_rate_form(inertia):
+    """(3, 3) matrix A, dimensionless, of an inertia (3,) or (3, 3): peak rate² = ω·Aω."""
+    moments = principal_moments(inertia)
+    low, high = jnp.min(moments), jnp.max(moments)
+    tensor = jnp.diag(inertia) if inertia.ndim == 1 else inertia
+    squared = jnp.matmul(tensor, tensor, precision="highest")
+    return ((low + high) * tensor - squared) / (low * high)

@@ -1,0 +1,34 @@
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from bodies import LM50, rotated_inertia
+from scipy.integrate import solve_ivp
+
+from attjax import rigid_body
+
+pytestmark = pytest.mark.usefixtures("strict_promotion")
+
+
+@pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
+def test_peak_rate_is_the_largest_of_a_long_coast(x64, inertia):
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        w = rng.normal(size=3)
+        w *= 0.4 / np.linalg.norm(w)
+        tensor = np.diag(inertia) if np.ndim(inertia) == 1 else inertia
+        coast = solve_ivp(
+            lambda _, w, tensor=tensor: np.linalg.solve(tensor, -np.cross(w, tensor @ w)),
+            (0, 300), w, "DOP853", t_eval=np.arange(0, 300, 0.02), rtol=1e-11, atol=1e-13,
+        )  # fmt: skip
+        rates = np.linalg.norm(coast.y, axis=0)
+        peak = float(rigid_body.peak_rate(jnp.asarray(w), jnp.asarray(inertia)))
+        assert rates.max() <= peak * (1 + 1e-8)
+        assert peak == pytest.approx(rates.max(), rel=1e-5)
+
+
+def test_peak_rate_of_steady_spins_and_of_a_sphere():
+    inertia = jnp.array(LM50)
+    spins = 0.3 * jnp.eye(3)
+    expected = [0.3, 0.3, 0.3 * np.sqrt(0.797 * (0.872 + 0.115 - 0.797) / (0.872 * 0.115))]
+    np.testing.assert_allclose(rigid_body.peak_rate(spins, inertia), expected, rtol=1e-6)
+    np.testing.assert_allclose(rigid_body.peak_rate(spins, jnp.full(3, 0.4)), 0.3, rtol=1e-6)
