@@ -17,10 +17,10 @@ from flax import struct
 from flax.training.train_state import TrainState
 
 from attjax import AttitudeEnv
+from attjax.presets import PAPER_FAST
 
-DISCOUNT, GAE_LAMBDA, CLIP = 0.99, 0.95, 0.2
-ENTROPY_WEIGHT, VALUE_WEIGHT, REWARD_SCALE = 1e-4, 0.5, 0.01
-LEARNING_RATE, MAX_GRADIENT_NORM = 3e-4, 0.5
+VALUE_WEIGHT = 0.5
+DISCOUNT, GAE_LAMBDA, CLIP = PAPER_FAST.discount, PAPER_FAST.gae_lambda, PAPER_FAST.clip
 
 
 class ActorCritic(nn.Module):
@@ -83,7 +83,8 @@ def init(env, workload, key) -> Runner:
     observation, env_states = jax.vmap(env.reset, (0, None))(keys, env.default_params)
     network = ActorCritic(workload.hidden_sizes, env.num_actions)
     transformation = optax.chain(
-        optax.clip_by_global_norm(MAX_GRADIENT_NORM), optax.adam(LEARNING_RATE, eps=1e-5)
+        optax.clip_by_global_norm(PAPER_FAST.max_gradient_norm),
+        optax.adam(PAPER_FAST.learning_rate, eps=1e-5),
     )
     params = network.init(network_key, observation)
     train_state = TrainState.create(apply_fn=network.apply, params=params, tx=transformation)
@@ -125,7 +126,7 @@ def env_step(env, num_envs, runner: Runner, _) -> tuple[Runner, Transition]:
         action=action,
         log_probability=taken(nn.log_softmax(logits), action),
         value=value,
-        reward=reward * REWARD_SCALE,
+        reward=reward * PAPER_FAST.reward_scale,
         done=terminated | truncated,
     )
     return runner.replace(env_states=env_states, observation=observation, key=key), transition
@@ -163,7 +164,11 @@ def loss(params, apply, transitions: Transition, advantages, targets):
     near_value = transitions.value + jnp.clip(value - transitions.value, -CLIP, CLIP)
     errors = jnp.maximum((value - targets) ** 2, (near_value - targets) ** 2)
     entropy = -jnp.mean(jnp.sum(jnp.exp(log_probabilities) * log_probabilities, axis=-1))
-    return -objective + VALUE_WEIGHT * 0.5 * jnp.mean(errors) - ENTROPY_WEIGHT * entropy
+    return (
+        -objective
+        + VALUE_WEIGHT * 0.5 * jnp.mean(errors)
+        - PAPER_FAST.entropy_coefficient * entropy
+    )
 
 
 def taken(log_probabilities, action):

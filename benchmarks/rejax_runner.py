@@ -8,8 +8,7 @@ from contenders import Workload, serve
 from gymnax.environments import spaces
 
 from attjax import AttitudeEnv
-
-REWARD_SCALE = 0.01
+from attjax.presets import PAPER_FAST
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,7 +31,7 @@ class FiveValueEnv:
         observation, state, reward, terminated, truncated, _ = self.env.step(
             key, state, action, params
         )
-        return observation, state, reward * REWARD_SCALE, terminated | truncated, {}
+        return observation, state, reward * PAPER_FAST.reward_scale, terminated | truncated, {}
 
     def observation_space(self, params):
         """As the environment's."""
@@ -51,12 +50,12 @@ def prepare(workload: Workload):
         num_steps=workload.rollout_length,
         num_epochs=workload.passes,
         num_minibatches=workload.minibatches,
-        learning_rate=3e-4,
-        gamma=0.99,
-        gae_lambda=0.95,
-        clip_eps=0.2,
-        ent_coef=1e-4,
-        max_grad_norm=0.5,
+        learning_rate=PAPER_FAST.learning_rate,
+        gamma=PAPER_FAST.discount,
+        gae_lambda=PAPER_FAST.gae_lambda,
+        clip_eps=PAPER_FAST.clip,
+        ent_coef=PAPER_FAST.entropy_coefficient,
+        max_grad_norm=PAPER_FAST.max_gradient_norm,
         agent_kwargs={"hidden_layer_sizes": workload.hidden_sizes, "activation": "relu"},
     )
     state = jax.jit(algorithm.init_state)(jax.random.key(0))
@@ -70,4 +69,4 @@ def prepare(workload: Workload):
 
 
 if __name__ == "__main__":
-    serve("rejax", ("rejax", "jax", "flax"), prepare)
+    serve(("rejax", "jax", "flax"), prepare)

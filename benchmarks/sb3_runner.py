@@ -9,8 +9,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv
 
 from attjax import AttitudeEnv
-
-REWARD_SCALE = 0.01
+from attjax.presets import PAPER_FAST
 
 
 class BatchedEnv(VecEnv):
@@ -39,7 +38,11 @@ class BatchedEnv(VecEnv):
             observation, states, reward, terminated, truncated, _ = jax.vmap(
                 env.step, (0, 0, 0, None)
             )(keys, states, actions, env.default_params)
-            return key, states, (observation, reward * REWARD_SCALE, terminated | truncated)
+            return (
+                key,
+                states,
+                (observation, reward * PAPER_FAST.reward_scale, terminated | truncated),
+            )
 
         return step
 
@@ -82,14 +85,15 @@ def prepare(workload: Workload):
     model = PPO(
         "MlpPolicy",
         BatchedEnv(workload.num_envs),
-        learning_rate=3e-4,
+        learning_rate=PAPER_FAST.learning_rate,
         n_steps=workload.rollout_length,
         batch_size=workload.minibatch_size,
         n_epochs=workload.passes,
-        gamma=0.99,
-        gae_lambda=0.95,
-        clip_range=0.2,
-        ent_coef=1e-4,
+        gamma=PAPER_FAST.discount,
+        gae_lambda=PAPER_FAST.gae_lambda,
+        clip_range=PAPER_FAST.clip,
+        ent_coef=PAPER_FAST.entropy_coefficient,
+        max_grad_norm=PAPER_FAST.max_gradient_norm,
         policy_kwargs={
             "net_arch": {"pi": list(workload.hidden_sizes), "vf": list(workload.hidden_sizes)},
             "activation_fn": torch.nn.ReLU,
@@ -105,4 +109,4 @@ def prepare(workload: Workload):
 
 if __name__ == "__main__":
     torch.set_num_threads(1)
-    serve("Stable-Baselines3", ("stable-baselines3", "torch"), prepare)
+    serve(("stable-baselines3", "torch"), prepare)

@@ -1,9 +1,9 @@
 """Training throughput on one core, beside other PPOs and what the matrix products allow.
 
 All train the paper's task (frameskip 20, Eq. 12-13, 11 numbers, 19 actions) with two separate
-networks, the same steps, passes and minibatches; one update is timed, compilation apart. Each
-is shown at its best minibatch size. The ceiling does the matrix products of the update alone.
-A peer runs in its own environment; one that is missing is a row that says so.
+networks, the same steps, passes and minibatches; one update is timed, compilation apart. All
+take turns. Each is shown at its best minibatch size. The ceiling does the matrix products of
+the update alone. A peer runs in its own environment; one that is missing is a row that says so.
 
     python -m venv rejax && rejax/bin/pip install rejax && rejax/bin/pip install --no-deps -e .
     python -m venv sb3 && sb3/bin/pip install -e . torch stable-baselines3 gymnasium
@@ -12,15 +12,14 @@ Example:
     python benchmarks/training.py --rejax-python rejax/bin/python --sb3-python sb3/bin/python
 """
 
+import contextlib
 import dataclasses
-import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import common
-from contenders import Contender, Workload, measure, with_rates
+from contenders import Contender, Peer, PeerError, Workload, measure, with_rates
 
 MORE_PASSES = 10
 """Passes at which attjax is compared with Stable-Baselines3, whose default they are."""
@@ -67,12 +66,9 @@ def main(argv=None):
     common.restrict_to_cores(1)
     few = workloads(arguments, arguments.passes)
     many = workloads(arguments, MORE_PASSES)
-    trainers, products = in_this_process(few, many, arguments.repeats)
     results = [
-        *trainers,
-        *peer("rejax", arguments.rejax_python, few, arguments.repeats),
-        *peer("Stable-Baselines3", arguments.sb3_python, many, arguments.sb3_repeats),
-        *(ceiling(products, workload) for workload in (*few, *many)),
+        *few_passes(few, arguments.rejax_python, arguments.repeats),
+        *many_passes(many, arguments.sb3_python, arguments.sb3_repeats),
     ]
     machine = common.machine()
     common.print_machine(machine)
@@ -86,18 +82,42 @@ def workloads(arguments, passes: int) -> list[Workload]:
     return [Workload(sizes, envs, length, passes, size) for size in arguments.minibatch_size]
 
 
-def in_this_process(few, many, repeats) -> tuple[list, list]:
-    """Results of attjax and of PureJaxRL's shape, and of the matrix products."""
-    import matrix_products
+def few_passes(workloads: list[Workload], rejax_python: str, repeats: int) -> list[dict]:
+    """Results of attjax, PureJaxRL's shape, rejax and the ceiling."""
     import purejaxrl_shape
 
-    ours = [Contender("attjax", workload, prepare_attjax) for workload in (*few, *many)]
-    theirs = [Contender("PureJaxRL's shape", w, purejaxrl_shape.prepare) for w in few]
-    rollout = Contender(ROLLOUT, few[0], matrix_products.prepare_rollout)
-    passes = [Contender(PASS, workload, matrix_products.prepare_pass) for workload in few]
-    results = measure([*ours, *theirs, rollout, *passes], repeats)
-    trainers = len(ours) + len(theirs)
-    return results[:trainers], results[trainers:]
+    ours = [Contender("attjax", w, prepare_attjax) for w in workloads]
+    theirs = [Contender("PureJaxRL's shape", w, purejaxrl_shape.prepare) for w in workloads]
+    return in_turns([*ours, *theirs], "rejax", rejax_python, workloads, repeats)
+
+
+def many_passes(workloads: list[Workload], sb3_python: str, repeats: int) -> list[dict]:
+    """Results of attjax, Stable-Baselines3 and the ceiling."""
+    ours = [Contender("attjax", w, prepare_attjax) for w in workloads]
+    return in_turns(ours, "Stable-Baselines3", sb3_python, workloads, repeats)
+
+
+def in_turns(contenders, peer_name, python, workloads, repeats) -> list[dict]:
+    """Results of the contenders, of the peer or why there are none, and of the ceiling."""
+    import matrix_products
+
+    products = [Contender(ROLLOUT, workloads[0], matrix_products.prepare_rollout)]
+    products += [Contender(PASS, w, matrix_products.prepare_pass) for w in workloads]
+    others, versions = [*contenders, *products], {}
+    try:
+        peer = Peer(python, FOLDER / RUNNERS[peer_name])
+    except PeerError as error:
+        reason = "not installed" if "ModuleNotFoundError" in str(error) else str(error)
+        results, absent = measure(others, repeats), [{"name": peer_name, "failure": reason}]
+    else:
+        peers = [Contender(peer_name, w, peer.prepare, peer.processor_s) for w in workloads]
+        with contextlib.closing(peer):
+            results, absent = measure([*peers, *others], repeats), []
+        versions = {"versions": peer.versions}
+    count = len(products)
+    ceilings = [ceiling(results[-count:], workload) for workload in workloads]
+    trainers = [r | versions if r["name"] == peer_name else r for r in results[:-count]]
+    return [*trainers, *absent, *ceilings]
 
 
 def prepare_attjax(workload: Workload):
@@ -117,24 +137,6 @@ def prepare_attjax(workload: Workload):
         state, _ = jax.block_until_ready(train_block(env_params, state, 1))
 
     return update
-
-
-def peer(name: str, python: str, workloads: list[Workload], repeats: int) -> list[dict]:
-    """Results of a runner in another environment, or one that says why there are none."""
-    request = {"workloads": [dataclasses.asdict(w) for w in workloads], "repeats": repeats}
-    try:
-        done = subprocess.run(
-            [python, FOLDER / RUNNERS[name]],
-            input=json.dumps(request),
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-    except (FileNotFoundError, subprocess.CalledProcessError) as error:
-        last_line = (getattr(error, "stderr", None) or "not found").strip().splitlines()[-1]
-        missing = isinstance(error, FileNotFoundError) or "ModuleNotFoundError" in last_line
-        return [{"name": name, "failure": "not installed" if missing else last_line}]
-    return json.loads(done.stdout.splitlines()[-1])
 
 
 def ceiling(products: list[dict], workload: Workload) -> dict:
@@ -170,7 +172,7 @@ def print_table(results: list[dict]) -> None:
     best, rows = best_of_each(results), []
     for (name, passes), result in sorted(best.items(), key=lambda item: item[0][1] or 0):
         if "failure" in result:
-            rows.append([name, *["–"] * 3, result["failure"], *["–"] * 4])
+            rows.append([f"{name}: {result['failure']}", *["–"] * 8])
             continue
         steps_per_s = result["steps_per_s"]
         rows.append(
