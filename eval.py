@@ -49,10 +49,10 @@ def main(argv=None) -> int:
     import jax
     import jax.numpy as jnp
 
-    from attjax import AttitudeEnv, checkpoint, evaluation, progress, report
+    from attjax import AttitudeEnv, evaluation, report, run_folder
 
     names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
-    with cli.one_line_errors("eval.py", checkpoint.CheckpointError):
+    with cli.one_line_errors("eval.py", run_folder.FolderError):
         controllers = {name: _controller(name, arguments.checkpoint) for name in names}
         _check_writable(arguments.json)
         plots = _prepare_plots(arguments.plot)
@@ -68,7 +68,7 @@ def main(argv=None) -> int:
         if plots:
             folder = arguments.plot / name if arguments.compare else arguments.plot
             flight = plots.Flight(controller, env, params, seed, flown)
-            metrics = arguments.checkpoint / progress.METRICS if name == POLICY else None
+            metrics = arguments.checkpoint / run_folder.METRICS if name == POLICY else None
             for path in plots.write_all(flight, folder, metrics):
                 print(f"wrote {path}")
     if arguments.compare:

@@ -1,7 +1,15 @@
 """Neural spacecraft attitude control: vectorised simulator and PPO in JAX."""
 
-from attjax.env import AttitudeEnv
-from attjax.spacecraft import EnvParams, EnvState, step
+import importlib
 
 __all__ = ["AttitudeEnv", "EnvParams", "EnvState", "step"]
 __version__ = "0.1.0"
+
+_MODULES = {"AttitudeEnv": "env", "EnvParams": "spacecraft", "EnvState": "spacecraft"}
+
+
+def __getattr__(name):
+    """Import at first use: JAX takes seconds, which ``train.py --help`` need not."""
+    if name not in __all__:
+        raise AttributeError(f"module 'attjax' has no attribute {name!r}")
+    return getattr(importlib.import_module("attjax." + _MODULES.get(name, "spacecraft")), name)

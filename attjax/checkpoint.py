@@ -1,118 +1,62 @@
-"""Run folders: ``config.json``, ``metrics.csv`` and one Orbax checkpoint a saved update.
+"""Checkpoints in a run folder, one Orbax folder a saved update, named by its number.
 
-Each checkpoint holds two items: ``policy``, all that evaluation needs beside config.json,
-and ``learner``, all that training needs to go on.
+Each holds two items: ``policy``, all that evaluation needs beside config.json, and ``learner``,
+all that training needs to go on. Orbax writes them beside and renames them when they are whole.
 """
 
-import dataclasses
 import functools
-import json
-import os
+import re
 import shutil
+import sys
 from pathlib import Path
 
 import jax
 import orbax.checkpoint as ocp
+from orbax.checkpoint import checkpoint_managers
 
-from attjax import assembly, settings
+from attjax import assembly, run_folder
 from attjax.learner import Learner
-from attjax.progress import METRICS
-from attjax.settings import Settings
+from attjax.run_folder import FolderError
 
-FORMAT = 4
-CONFIG = "config.json"
-KEPT = 3
+NEWEST_KEPT = 3
+BEST_BY = "terminal_error_deg"
 
 
-class CheckpointError(Exception):
-    """A run folder cannot be used; the message is one line for the user."""
+def _error(metrics):
+    return metrics[BEST_BY]
 
 
-@dataclasses.dataclass(frozen=True)
-class Config:
-    """What a run was started with."""
-
-    preset: str
-    seed: int
-    settings: Settings
+_unraisable = sys.unraisablehook
 
 
-def holds_run(folder: Path) -> bool:
-    """Whether a training run was started in the folder."""
-    return (folder / CONFIG).is_file()
-
-
-def create(folder: Path, config: Config, overwrite: bool) -> None:
-    """Prepare a folder for a new run.
-
-    Raises:
-        CheckpointError: it holds a run and ``overwrite`` is false, holds only something else,
-            or cannot be written. It is left as it was. Other files beside a run that is
-            overwritten stay.
-    """
-    folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if holds_run(folder):
-            if not overwrite:
-                raise CheckpointError(
-                    f"{folder} holds a run already: pass --resume to continue it, "
-                    f"--overwrite to replace it, or another --checkpoint"
-                )
-            read_config(folder)
-            _remove_run(folder)
-        elif any(folder.iterdir()):
-            raise CheckpointError(
-                f"{folder} is not empty and holds no attjax run; choose another folder"
-            )
-        write_config(folder, config)
-    except OSError as error:
-        raise CheckpointError(f"{folder} cannot be written: {error.strerror}") from None
-
-
-def write_config(folder: Path, config: Config) -> None:
-    """Write config.json in one atomic step."""
-    content = {"program": "attjax", "format": FORMAT, **dataclasses.asdict(config)}
-    temporary = folder / (CONFIG + ".tmp")
-    temporary.write_text(json.dumps(content, indent=2) + "\n")
-    os.replace(temporary, folder / CONFIG)
-
-
-def read_config(folder: Path) -> Config:
-    """What the run in the folder was started with.
-
-    Raises:
-        CheckpointError: the folder is missing, no run of this program or of a newer format.
-    """
-    path = Path(folder) / CONFIG
-    if not Path(folder).is_dir():
-        raise CheckpointError(f"there is no checkpoint folder {folder}")
-    if not path.is_file():
-        raise CheckpointError(f"{folder} is no attjax checkpoint: it has no {CONFIG}")
-    try:
-        content = json.loads(path.read_text())
-        if content["program"] != "attjax":
-            raise CheckpointError(f"{path} was written by another program")
-        if content["format"] != FORMAT:
-            raise CheckpointError(
-                f"{path} has format {content['format']}; this version of attjax reads {FORMAT}"
-            )
-        return Config(
-            str(content["preset"]), int(content["seed"]), settings.from_json(content["settings"])
-        )
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise CheckpointError(f"{path} cannot be read: {error}") from None
+def _hook(unraisable):
+    """Print no traceback of reads that Orbax leaves be where another array cannot be read."""
+    if str(unraisable.exc_value) != "Event loop is closed":
+        _unraisable(unraisable)
 
 
 class Saver:
-    """Saves learners into a run folder and keeps the newest few; use as a context manager."""
+    """Saves learners into a run folder; use as a context manager.
+
+    Of the checkpoints it keeps the newest three, and the one with the least terminal error.
+    """
 
     def __init__(self, folder: Path):
+        self._folder = Path(folder)
+        for leftover in self._folder.glob("[0-9]*.orbax-checkpoint-tmp*"):
+            shutil.rmtree(leftover, ignore_errors=True)
+        newest = checkpoint_managers.LatestN(NEWEST_KEPT)
+        best = checkpoint_managers.BestN(
+            get_metric_fn=_error, reverse=True, n=1, keep_checkpoints_without_metrics=False
+        )
         self._manager = ocp.CheckpointManager(
-            Path(folder).absolute(),
-            # Synchronous: the next block of updates reuses the buffers that are being written.
+            self._folder.absolute(),
             options=ocp.CheckpointManagerOptions(
-                max_to_keep=KEPT, enable_async_checkpointing=False
+                best_fn=_error,
+                best_mode="min",
+                preservation_policy=checkpoint_managers.AnyPreservationPolicy([newest, best]),
+                # Synchronous: the next block of updates reuses the buffers that are being written.
+                enable_async_checkpointing=False,
             ),
         )
 
@@ -122,29 +66,39 @@ class Saver:
     def __exit__(self, *_):
         self._manager.close()
 
-    def save(self, learner: Learner) -> None:
-        """Save at once; a checkpoint of the same update is left as it is."""
+    def save(self, learner: Learner, terminal_error: float | None = None) -> None:
+        """Save at once; a checkpoint of the same update is left as it is.
+
+        Raises:
+            FolderError: it cannot be written. Those saved before are as they were.
+        """
         update = int(learner.update)
-        if update not in self._manager.all_steps():
-            self._manager.save(
-                update,
-                args=ocp.args.Composite(
-                    policy=ocp.args.StandardSave(learner.params["policy"]),
-                    learner=ocp.args.StandardSave(_storable(learner)),
-                ),
-            )
+        if update in self._manager.all_steps():
+            return
+        items = ocp.args.Composite(
+            policy=ocp.args.StandardSave(learner.params["policy"]),
+            learner=ocp.args.StandardSave(_storable(learner)),
+        )
+        metrics = None if terminal_error is None else {BEST_BY: terminal_error}
+        try:
+            self._manager.save(update, args=items, metrics=metrics)
+        except Exception as error:  # Orbax raises many kinds, for a full disk among others
+            path, reason = self._folder / str(update), _first_sentence(error)
+            raise FolderError(f"checkpoint {path} cannot be written: {reason}") from None
 
 
 def latest(folder: Path) -> int | None:
     """The newest saved update, None if nothing was saved yet."""
-    steps = ocp.utils.checkpoint_steps(Path(folder).absolute())
-    return max(steps, default=None)
+    return max(ocp.utils.checkpoint_steps(Path(folder).absolute()), default=None)
 
 
 def restore_learner(folder: Path, template: Learner) -> Learner:
     """The newest saved learner, placed like ``template``, one of the same settings.
 
     The run may have used other devices, or another number of them.
+
+    Raises:
+        FolderError: the folder holds no checkpoint, an unreadable one or one of another run.
     """
     restored = _restore(folder, "learner", _storable(template))
     implementation = jax.random.key_impl(template.key)
@@ -157,9 +111,9 @@ def restore_policy(folder: Path) -> jax.tree_util.Partial:
     It is placed on the default device wherever it was trained.
 
     Raises:
-        CheckpointError: the folder holds no checkpoint, or an unreadable one.
+        FolderError: the folder holds no checkpoint, an unreadable one or one of another run.
     """
-    policy = assembly.policy(read_config(folder).settings)
+    policy = assembly.policy(run_folder.read_config(folder).settings)
     template = jax.eval_shape(functools.partial(assembly.initial_parameters, policy))["policy"]
     params = _restore(folder, "policy", template)
     return jax.tree_util.Partial(policy.act, {"policy": params})
@@ -168,27 +122,27 @@ def restore_policy(folder: Path) -> jax.tree_util.Partial:
 def _restore(folder, item, template):
     update = latest(folder)
     if update is None:
-        raise CheckpointError(f"{folder} holds no checkpoint yet")
+        raise FolderError(f"{folder} holds no checkpoint yet")
+    path = (Path(folder) / str(update) / item).absolute()
     device = jax.sharding.SingleDeviceSharding(jax.devices()[0])
     target = jax.tree.map(
         lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype, sharding=x.sharding or device), template
     )
-    path = (Path(folder) / str(update) / item).absolute()
-    try:
-        return ocp.StandardCheckpointer().restore(path, target)
-    except Exception as error:  # Orbax raises many kinds for damaged files
-        reason = str(error).strip().split("\n")[0][:200]
-        raise CheckpointError(f"checkpoint {path} cannot be read: {reason}") from None
+    sys.unraisablehook = _hook
+    with ocp.StandardCheckpointer() as checkpointer:
+        try:
+            return checkpointer.restore(path, target)
+        except Exception as error:  # Orbax raises many kinds for damaged files
+            reason = _first_sentence(error)
+    advice = ""
+    if len(ocp.utils.checkpoint_steps(Path(folder).absolute())) > 1:
+        advice = f"; remove {path.parent} to go back to the checkpoint before it"
+    raise FolderError(f"checkpoint {path} cannot be read: {reason}{advice}")
+
+
+def _first_sentence(error):
+    return re.split(r"\n|\. ", str(error).strip())[0][:200] or type(error).__name__
 
 
 def _storable(learner):
     return learner.replace(key=jax.random.key_data(learner.key))
-
-
-def _remove_run(folder):
-    for path in folder.iterdir():
-        is_checkpoint = path.is_dir() and path.name.split(".")[0].isdigit()
-        if is_checkpoint:
-            shutil.rmtree(path)
-        elif path.name.removesuffix(".tmp") in (CONFIG, METRICS):
-            path.unlink()

@@ -5,6 +5,7 @@ import contextlib
 import dataclasses
 import functools
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -43,6 +44,32 @@ def one_line_errors(prog: str, *kinds: type[Exception]):
 def _fail(prog, message):
     print(f"{prog}: error: {' '.join(str(message).split())}", file=sys.stderr)
     sys.exit(BAD_INPUT)
+
+
+class StopSignals:
+    """Notes SIGINT and SIGTERM, for the work to end where it can go on; a context manager.
+
+    A second one ends the process at once.
+
+    Attributes:
+        received: the signal's number, None before.
+    """
+
+    received: int | None = None
+
+    def __enter__(self):
+        signals = (signal.SIGINT, signal.SIGTERM)
+        self._before = {number: signal.signal(number, self._note) for number in signals}
+        return self
+
+    def __exit__(self, *_):
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _note(self, number, _):
+        self.received = number
+        for each in self._before:
+            signal.signal(each, signal.SIG_DFL)
 
 
 def add_common(parser: argparse.ArgumentParser, seed_help: str) -> None:

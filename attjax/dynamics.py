@@ -7,13 +7,12 @@ fastest axis has length 3 or 4.
 
 import functools
 
-import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from attjax import checks, rigid_body
 from attjax import quaternion as quaternions
-from attjax import rigid_body
 from attjax.kernel import one_loop
 
 INTEGRATION_STEP = 1 / 240
@@ -45,7 +44,8 @@ def rk4_step(quaternion, angular_velocity, torque, inertia, dt=INTEGRATION_STEP)
         The quaternion (4,) and the angular velocity (3,) after the step.
 
     Raises:
-        AssertionError: shapes differ from the above, or floating-point types are mixed.
+        ValueError: shapes differ from the above, floating-point types are mixed, or a value is
+            not finite or no inertia of a rigid body.
 
     Example:
         >>> q, w = rk4_step(jnp.array([0.0, 0.0, 0.0, 1.0]), jnp.zeros(3),
@@ -108,10 +108,16 @@ def rate_after_impulse(angular_velocity, torque, inertia):
 
 
 def _checked(quaternion, angular_velocity, torque, inertia):
-    arrays = [jnp.asarray(x) for x in (quaternion, angular_velocity, torque, inertia)]
-    chex.assert_shape(arrays, [(4,), (3,), (3,), {1: (3,)}.get(arrays[3].ndim, (3, 3))])
-    chex.assert_type(arrays, arrays[0].dtype)
-    return arrays
+    inertia = checks.inertia(inertia)
+    vectors = {
+        "quaternion": checks.real("quaternion", quaternion, (4,)),
+        "angular_velocity": checks.real("angular_velocity", angular_velocity, (3,)),
+        "torque": checks.real("torque", torque, (3,)),
+    }
+    for name, x in vectors.items():
+        if x.dtype != inertia.dtype:
+            raise ValueError(f"{name} has type {x.dtype}; it must be {inertia.dtype}, as inertia")
+    return *vectors.values(), inertia
 
 
 def _euler_terms(inertia, torque):

@@ -75,8 +75,14 @@ class AttitudeEnv:
         return rk4_steps * dynamics.INTEGRATION_STEP
 
     def reset(self, key: chex.PRNGKey, params: EnvParams | None = None):
-        """Start an episode. Returns the observation (11,) and the state."""
-        state = self.initial_state(key, self.default_params if params is None else params)
+        """Start an episode. Returns the observation (11,) and the state.
+
+        Raises:
+            ValueError: a parameter is not as :class:`attjax.EnvParams` says.
+        """
+        params = self.default_params if params is None else params
+        spacecraft.check_params(params, self.frameskip)
+        state = self.initial_state(key, params)
         return observations.observe(state.quaternion, state.angular_velocity), state
 
     reset_env = reset
@@ -92,6 +98,9 @@ class AttitudeEnv:
             Observation (11,), state, reward, terminated, truncated, info. Where the episode
             ended, observation and state are the next episode's, and
             ``info["final_observation"]`` is the ended one's.
+
+        Raises:
+            ValueError: as :func:`attjax.step`.
         """
         params = self.default_params if params is None else params
         observation, next_state, reward, terminated, info = self.step_env(

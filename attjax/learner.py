@@ -109,14 +109,19 @@ def optimizer(settings: Settings) -> optax.GradientTransformation:
     It is given a network's gradient as one vector: dozens of small arrays cost more to start on
     than to work through.
     """
+    clip = optax.identity()
+    if settings.max_gradient_norm > 0:
+        clip = optax.clip_by_global_norm(settings.max_gradient_norm)
+    return optax.chain(clip, optax.adam(functools.partial(learning_rate, settings)))
+
+
+def learning_rate(settings: Settings, gradient_step) -> chex.Array:
+    """Adam's learning rate in a gradient step, annealed linearly over the whole run."""
     gradient_steps = settings.num_updates * settings.passes * settings.minibatches
     schedule = optax.linear_schedule(
         settings.learning_rate, settings.final_learning_rate, gradient_steps
     )
-    clip = optax.identity()
-    if settings.max_gradient_norm > 0:
-        clip = optax.clip_by_global_norm(settings.max_gradient_norm)
-    return optax.chain(clip, optax.adam(schedule))
+    return schedule(gradient_step)
 
 
 def entropy_coefficient(settings: Settings, update) -> chex.Array:

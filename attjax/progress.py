@@ -2,7 +2,6 @@
 
 import csv
 import io
-import os
 import time
 from pathlib import Path
 
@@ -10,7 +9,8 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-METRICS = "metrics.csv"
+from attjax import run_folder
+
 WIDTH_FOR_BAR = 100
 COLUMNS = (
     "agent_steps", "wall_s", "episodes", "episode_return", "episode_return_std",
@@ -42,24 +42,46 @@ def metrics_row(metrics: dict, agent_steps: int, wall_s: float) -> dict:
 
 
 class MetricsFile:
-    """Appends rows to metrics.csv; each is on disk when ``append`` returns."""
+    """Appends rows to metrics.csv; each is in the file when ``append`` returns."""
 
     def __init__(self, folder: Path, resume_at: int):
-        """Open the file, dropping the rows after ``resume_at`` agent steps."""
-        self._path = folder / METRICS
-        rows = []
-        if self._path.exists():
-            with self._path.open(newline="") as file:
-                rows = [r for r in csv.DictReader(file) if int(r["agent_steps"]) <= resume_at]
+        """Open the file, dropping the rows after ``resume_at`` agent steps.
+
+        Raises:
+            FolderError: it cannot be read or written, or its rows are no rows of metrics.
+        """
+        self._folder, self._path = folder, folder / run_folder.METRICS
+        rows = [row for row in _read_rows(self._path) if int(row["agent_steps"]) <= resume_at]
         self.wall_s = float(rows[-1]["wall_s"]) if rows else 0.0
-        temporary = folder / (METRICS + ".tmp")
-        temporary.write_text(_csv_text(rows, header=True))
-        os.replace(temporary, self._path)
+        with run_folder.writing(folder):
+            run_folder.replace(self._path, _csv_text(rows, header=True))
 
     def append(self, row: dict) -> None:
-        """Add one row."""
-        with self._path.open("a", newline="") as file:
+        """Add one row.
+
+        Raises:
+            FolderError: it cannot be written.
+        """
+        with run_folder.writing(self._folder), self._path.open("a", newline="") as file:
             file.write(_csv_text([{k: _cell(v) for k, v in row.items()}]))
+
+
+def _read_rows(path):
+    """The rows of a file that need not exist; one whose writing was cut off is left out."""
+    if not path.exists():
+        return []
+    try:
+        lines = path.read_text().splitlines(keepends=True)
+        rows = list(csv.DictReader(line for line in lines if line.endswith("\n")))
+        for row in rows:
+            if set(row) != set(COLUMNS) or None in row.values():
+                raise ValueError(f"a row has other columns than {','.join(COLUMNS[:3])}...")
+            int(row["agent_steps"]), float(row["wall_s"])
+    except (OSError, ValueError, csv.Error) as error:
+        raise run_folder.FolderError(
+            f"{path} cannot be read: {error}; without it, the run goes on and begins a new one"
+        ) from None
+    return rows
 
 
 def _cell(value):

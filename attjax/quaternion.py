@@ -6,6 +6,8 @@ The error quaternion relates the body frame to the desired frame; the goal is ``
 import chex
 import jax.numpy as jnp
 
+from attjax import checks
+
 
 def from_axis_angle(axis: chex.Array, angle: chex.Array) -> chex.Array:
     """Quaternion of a rotation (Eq. 8).
@@ -21,8 +23,7 @@ def from_axis_angle(axis: chex.Array, angle: chex.Array) -> chex.Array:
         >>> from_axis_angle(jnp.array([0.0, 0.0, 1.0]), jnp.pi)[2].item()
         1.0
     """
-    axis = jnp.asarray(axis)
-    chex.assert_shape(axis, (3,))
+    axis = checks.real("axis", axis, (3,))
     return jnp.append(axis * jnp.sin(angle / 2), jnp.cos(angle / 2))
 
 
@@ -63,8 +64,7 @@ def rotation_vector(quaternion: chex.Array) -> chex.Array:
         >>> round(rotation_vector(q)[1].item() / jnp.pi, 6)
         -0.5
     """
-    quaternion = jnp.asarray(quaternion)
-    chex.assert_shape(quaternion, (4,))
+    quaternion = checks.real("quaternion", quaternion, (4,))
     sine = jnp.sqrt(jnp.sum(quaternion[:3] ** 2))
     half_angle = jnp.arctan2(sine, jnp.abs(quaternion[3]))
     tiny = jnp.finfo(quaternion.dtype).tiny
@@ -82,6 +82,5 @@ def error_angle(quaternion: chex.Array) -> chex.Array:
         >>> round(jnp.rad2deg(error_angle(jnp.array([0.0, 1e-9, 0.0, 1.0]))).item(), 10)
         1.146e-07
     """
-    quaternion = jnp.asarray(quaternion)
-    chex.assert_shape(quaternion, (4,))
+    quaternion = checks.real("quaternion", quaternion, (4,))
     return 2 * jnp.arctan2(jnp.sqrt(jnp.sum(quaternion[:3] ** 2)), quaternion[3])

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import dynamics
+from attjax import checks, dynamics
 from attjax import quaternion as quaternions
 
 EPISODE_RK4_STEPS = 10_500
@@ -84,6 +84,24 @@ def max_steps(frameskip: int) -> int:
     return EPISODE_RK4_STEPS // (frameskip + 1)
 
 
+def check_params(params: EnvParams, frameskip: int) -> None:
+    """Check parameters of one spacecraft, as far as they have values.
+
+    Raises:
+        ValueError: one is not what :class:`EnvParams` says.
+    """
+    checks.inertia(params.inertia)
+    checks.real("torque_table", params.torque_table, (None, 3))
+    checks.real("rate_limit", params.rate_limit, (), above=0)
+    checks.real("goal_angle", params.goal_angle, (), above=0)
+    low = checks.real("min_slew_angle", params.min_slew_angle, (), low=0)
+    low = np.asarray(low) if checks.has_value(low) else None
+    checks.real("max_slew_angle", params.max_slew_angle, (), low=low)
+    checks.integer("max_steps_in_episode", params.max_steps_in_episode, 1, 2**31 - 1)
+    if params.frameskip is not None:
+        checks.integer("params.frameskip", params.frameskip, 0, frameskip)
+
+
 def initial_state(key: chex.PRNGKey, params: EnvParams) -> EnvState:
     """A spacecraft at rest, turned by a uniform angle about a uniformly distributed axis."""
     return _slew(jax.random.uniform(key, (3,), params.inertia.dtype), params)
@@ -150,14 +168,20 @@ def step(state: EnvState, action, params: EnvParams | None = None, frameskip: in
     Returns:
         The state (1 + frameskip)/240 s later.
 
+    Raises:
+        ValueError: a shape, a type or a value is not as said; values are only checked outside
+            ``jit`` and ``vmap``, where an action beyond the table is the nearest one.
+
     Example:
         >>> goal = EnvState(jnp.array([0.0, 0.0, 0.0, 1.0]), jnp.zeros(3), 0)
         >>> round(float(step(goal, 1).angular_velocity[0]), 6)   # 0.5 N m for 1/240 s
         0.002389
     """
     params = default_params(frameskip) if params is None else params
+    check_params(params, frameskip)
+    action = checks.integer("action", action, 0, len(params.torque_table) - 1)
     quaternion, angular_velocity = dynamics.propagate(
-        state.quaternion,
+        checks.unit_quaternion("quaternion", state.quaternion),
         state.angular_velocity,
         params.torque_table[action],
         params.inertia,

@@ -35,13 +35,6 @@ RECIPES = {
     "paper": ["--preset", "paper"],
 }  # fmt: skip
 
-TRAIN = """
-import sys, train
-train.SAVE_EVERY_S = float(sys.argv[1])
-sys.exit(train.main(sys.argv[2:]))
-"""
-"""train.py with denser checkpoints."""
-
 
 @dataclasses.dataclass(frozen=True)
 class Point:
@@ -120,10 +113,11 @@ def training(name: str, arguments):
     with tempfile.TemporaryDirectory() as scratch:
         folder, log = Path(scratch) / "run", Path(scratch) / "log"
         flags = [*RECIPES[name], "--seed", str(arguments.seed), "--checkpoint", str(folder)]
+        flags += ["--save-every", str(arguments.every)]
         with log.open("w") as output:
             start = time.monotonic()
             process = subprocess.Popen(
-                [sys.executable, "-c", TRAIN, str(arguments.every), *flags],
+                [sys.executable, "train.py", *flags],
                 cwd=ROOT,
                 env=os.environ | {"XDG_CACHE_HOME": scratch},
                 stdout=output,
@@ -171,7 +165,7 @@ class Examiner:
         """The newest policy's figures."""
         import jax
 
-        from attjax import checkpoint
+        from attjax import checkpoint, run_folder
 
         update = checkpoint.latest(self._folder)
         policy = checkpoint.restore_policy(self._folder)
@@ -180,7 +174,7 @@ class Examiner:
         policy = jax.tree_util.Partial(self._act, *policy.args)
         at_11_hz, at_40_hz = (self._statistics(policy, frameskip) for frameskip in (20, 5))
         mean_return = at_11_hz["episode_return"]["mean"]
-        settings = checkpoint.read_config(self._folder).settings
+        settings = run_folder.read_config(self._folder).settings
         return Point(
             seconds=round(seconds, 1),
             agent_steps=update * settings.steps_per_update,

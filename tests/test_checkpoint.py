@@ -6,8 +6,8 @@ import jax
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, presets
-from attjax.checkpoint import CheckpointError, Config
+from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, presets, run_folder
+from attjax.run_folder import Config, FolderError
 
 SETTINGS = dataclasses.replace(
     presets.PRECISE,
@@ -25,7 +25,7 @@ CONFIG = Config("precise", 3, SETTINGS)
 def trained(tmp_path_factory):
     """A run folder with one checkpoint, and the learner saved in it."""
     folder = tmp_path_factory.mktemp("run")
-    checkpoint.create(folder, CONFIG, overwrite=False)
+    run_folder.create(folder, CONFIG, overwrite=False)
     setup = assembly.setup(SETTINGS)
     env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(3))
@@ -42,7 +42,7 @@ def copy(learner_state):
 
 
 def test_config_round_trip(trained):
-    assert checkpoint.read_config(trained[0]) == CONFIG
+    assert run_folder.read_config(trained[0]) == CONFIG
 
 
 def test_restored_learner_is_the_saved_one_and_goes_on_bitwise(trained):
@@ -96,31 +96,31 @@ def test_float32_policy_serves_a_float64_simulation(trained, x64):
 def test_a_run_is_not_overwritten_unless_asked(trained):
     folder = trained[0]
     before = sorted(p.name for p in folder.rglob("*"))
-    with pytest.raises(CheckpointError, match=r"--resume .* --overwrite"):
-        checkpoint.create(folder, CONFIG, overwrite=False)
+    with pytest.raises(FolderError, match=r"--resume .* --overwrite"):
+        run_folder.create(folder, CONFIG, overwrite=False)
     assert sorted(p.name for p in folder.rglob("*")) == before
 
 
 def test_overwrite_removes_the_run_and_nothing_else(tmp_path):
-    checkpoint.create(tmp_path, CONFIG, overwrite=False)
+    run_folder.create(tmp_path, CONFIG, overwrite=False)
     (tmp_path / "7").mkdir()
     (tmp_path / "metrics.csv").write_text("x")
     (tmp_path / "metrics.csv.tmp").write_text("x")
     (tmp_path / "figure.png").write_text("precious")
-    checkpoint.create(tmp_path, CONFIG, overwrite=True)
+    run_folder.create(tmp_path, CONFIG, overwrite=True)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["config.json", "figure.png"]
 
 
 def test_folders_with_other_files_are_refused_and_kept(tmp_path):
     (tmp_path / "thesis.tex").write_text("precious")
     for overwrite in (False, True):
-        with pytest.raises(CheckpointError, match="not empty"):
-            checkpoint.create(tmp_path, CONFIG, overwrite)
+        with pytest.raises(FolderError, match="not empty"):
+            run_folder.create(tmp_path, CONFIG, overwrite)
     assert (tmp_path / "thesis.tex").read_text() == "precious"
 
 
 def edited(tmp_path, **changes):
-    checkpoint.create(tmp_path, CONFIG, overwrite=False)
+    run_folder.create(tmp_path, CONFIG, overwrite=False)
     path = tmp_path / "config.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | changes))
     return tmp_path
@@ -136,20 +136,20 @@ def edited(tmp_path, **changes):
     ],
 )
 def test_foreign_configurations_are_refused(tmp_path, changes, message):
-    with pytest.raises(CheckpointError, match=message):
-        checkpoint.read_config(edited(tmp_path, **changes))
+    with pytest.raises(FolderError, match=message):
+        run_folder.read_config(edited(tmp_path, **changes))
 
 
 def test_missing_empty_and_truncated_folders_are_refused(tmp_path, trained):
-    with pytest.raises(CheckpointError, match="no checkpoint folder"):
+    with pytest.raises(FolderError, match="no checkpoint folder"):
         checkpoint.restore_policy(tmp_path / "nowhere")
-    with pytest.raises(CheckpointError, match=r"no config\.json"):
+    with pytest.raises(FolderError, match=r"no config\.json"):
         checkpoint.restore_policy(tmp_path)
-    checkpoint.create(tmp_path, CONFIG, overwrite=False)
-    with pytest.raises(CheckpointError, match="no checkpoint yet"):
+    run_folder.create(tmp_path, CONFIG, overwrite=False)
+    with pytest.raises(FolderError, match="no checkpoint yet"):
         checkpoint.restore_policy(tmp_path)
     (tmp_path / "config.json").write_text("{")
-    with pytest.raises(CheckpointError, match="cannot be read"):
+    with pytest.raises(FolderError, match="cannot be read"):
         checkpoint.restore_policy(tmp_path)
 
 
@@ -159,6 +159,6 @@ def test_damaged_checkpoints_are_refused_in_one_line(trained, tmp_path):
     for path in (folder / "2" / "policy").rglob("*"):
         if path.is_file():
             path.write_bytes(b"")
-    with pytest.raises(CheckpointError, match="cannot be read") as error:
+    with pytest.raises(FolderError, match="cannot be read") as error:
         checkpoint.restore_policy(folder)
     assert "\n" not in str(error.value)

@@ -186,11 +186,11 @@ def test_float32_stays_close_to_float64(frameskip):
 def test_wrong_shapes_and_mixed_types_are_refused():
     q, w, torque = jnp.array([0.0, 0, 0, 1]), jnp.zeros(3), jnp.zeros(3)
     inertia = jnp.array(LM50)
-    with pytest.raises(AssertionError, match="shape"):
+    with pytest.raises(ValueError, match=r"quaternion has shape \(3,\); it must be \(4,\)"):
         dynamics.rk4_step(q[:3], w, torque, inertia)
-    with pytest.raises(AssertionError, match="shape"):
+    with pytest.raises(ValueError, match=r"inertia has shape \(3, 2\)"):
         dynamics.rk4_step(q, w, torque, jnp.ones((3, 2)))
-    with pytest.raises(AssertionError, match="type"):
+    with pytest.raises(ValueError, match="angular_velocity has type float16; it must be float32"):
         dynamics.rk4_step(q, w.astype(jnp.float16), torque, inertia)
 
 
@@ -238,7 +238,8 @@ def test_gradient_through_an_agent_step_is_that_of_finite_differences(x64):
     arguments = [x[0] for x in random_spacecraft(1)]
 
     def miss(torque, inertia):
-        q, w = dynamics.propagate(*arguments[:2], torque, inertia, 5)
+        symmetric = inertia if inertia.ndim == 1 else (inertia + inertia.T) / 2
+        q, w = dynamics.propagate(*arguments[:2], torque, symmetric, 5)
         return jnp.sum(q[:3] ** 2) + jnp.sum(w**2)
 
     for inertia in (jnp.asarray(LM50), jnp.asarray(rotated_inertia())):

@@ -6,7 +6,8 @@ from pathlib import Path
 import attjax
 
 LAYERS = [
-    {"settings", "quaternion", "context", "spaces", "rigid_body", "kernel", "vector"},
+    {"settings", "checks", "context", "spaces", "rigid_body", "kernel", "vector"},
+    {"quaternion"},
     {"dynamics"},
     {"spacecraft", "reward", "observation"},
     {"env"},
@@ -15,10 +16,10 @@ LAYERS = [
     {"learner", "evaluation"},
     {"rollout", "descent"},
     {"ppo"},
-    {"presets", "assembly"},
+    {"presets", "assembly", "run_folder"},
     {"progress", "report", "cli"},
     {"checkpoint"},
-    {"plots"},
+    {"training", "plots"},
 ]
 LEARNING = {"networks", "losses", "learner", "rollout", "descent", "ppo"}
 SPACECRAFT = {"spacecraft", "reward", "env"}

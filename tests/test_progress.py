@@ -3,7 +3,7 @@ import csv
 import jax.numpy as jnp
 import pytest
 
-from attjax import progress
+from attjax import progress, run_folder
 
 
 def block_metrics(**episodes):
@@ -36,7 +36,7 @@ def test_row_is_empty_where_no_episode_ended():
 
 
 def rows_of(folder):
-    with (folder / progress.METRICS).open(newline="") as file:
+    with (folder / run_folder.METRICS).open(newline="") as file:
         return list(csv.DictReader(file))
 
 

@@ -1,0 +1,125 @@
+"""Checks of arrays that users hand in: one line that names the array and what is allowed.
+
+Shapes and types are always checked. Values are checked where there are any: inside ``jit`` and
+``vmap`` arrays have none yet.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+UNIT_TOLERANCE = 1e-3
+"""Largest ‖q‖ − 1 that is taken for rounding."""
+
+
+def has_value(x) -> bool:
+    """Whether an array has a value, rather than standing for one while JAX traces."""
+    return not isinstance(x, jax.core.Tracer)
+
+
+def real(name: str, x, *shapes: tuple[int | None, ...], low=None, above=None):
+    """Return x as an array of floating-point numbers, finite, of one of the shapes and in range.
+
+    Args:
+        name: what the error calls it.
+        x: anything that ``jnp.asarray`` takes.
+        shapes: that are allowed; None stands for any length.
+        low, above: smallest value, or an exclusive limit.
+
+    Raises:
+        ValueError: it is something else.
+
+    Example:
+        >>> real("rate_limit", -0.5, (), above=0)
+        Traceback (most recent call last):
+        ValueError: rate_limit is -0.5; it must be above 0
+    """
+    x = _array(name, x)
+    if not jnp.issubdtype(x.dtype, jnp.floating):
+        raise ValueError(f"{name} has type {x.dtype}; it must be floating-point")
+    _check_shape(name, x.shape, shapes)
+    if has_value(x):
+        values = np.asarray(x)
+        if not np.all(np.isfinite(values)):
+            raise ValueError(f"{name} is {_shown(values)}; it must be finite")
+        if low is not None and not np.all(values >= low):
+            raise ValueError(f"{name} is {_shown(values)}; it must be at least {low}")
+        if above is not None and not np.all(values > above):
+            raise ValueError(f"{name} is {_shown(values)}; it must be above {above}")
+    return x
+
+
+def integer(name: str, x, low: int, high: int):
+    """Return x as an integer scalar from low to high.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    x = _array(name, x)
+    if not jnp.issubdtype(x.dtype, jnp.integer):
+        raise ValueError(f"{name} has type {x.dtype}; it must be an integer")
+    _check_shape(name, x.shape, [()])
+    if has_value(x) and not low <= np.asarray(x) <= high:
+        raise ValueError(f"{name} is {x}; it must be from {low} to {high}")
+    return x
+
+
+def unit_quaternion(name: str, x):
+    """Return x as a unit quaternion (4,).
+
+    Raises:
+        ValueError: it is something else.
+    """
+    x = real(name, x, (4,))
+    if has_value(x):
+        length = np.linalg.norm(np.asarray(x, float))
+        if abs(length - 1) > UNIT_TOLERANCE:
+            raise ValueError(f"{name} has length {length:.6g}; it must be 1")
+    return x
+
+
+def inertia(x):
+    """Return x as the inertia of a rigid body, (3,) principal moments or (3, 3), kg m².
+
+    Of a body with mass, the moments are positive and none is larger than the other two
+    together.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    x = real("inertia", x, (3,), (3, 3))
+    if has_value(x):
+        values = np.asarray(x, float)
+        if values.ndim == 2 and not np.allclose(values, values.T, rtol=1e-5, atol=0):
+            raise ValueError(f"inertia is {_shown(values)}; it must be symmetric")
+        moments = np.sort(values if values.ndim == 1 else np.linalg.eigvalsh(values))
+        if moments[0] <= 0:
+            raise ValueError(
+                f"inertia has principal moments {_shown(moments)}; they must be positive"
+            )
+        if moments[2] > (moments[0] + moments[1]) * (1 + 1e-5):
+            raise ValueError(
+                f"inertia has principal moments {_shown(moments)}; "
+                f"none may be larger than the other two together"
+            )
+    return x
+
+
+def _array(name, x):
+    try:
+        return jnp.asarray(x)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} is {type(x).__name__}; it must be an array of numbers") from None
+
+
+def _check_shape(name, shape, allowed):
+    def fits(pattern):
+        return len(shape) == len(pattern) and all(b in (None, a) for a, b in zip(shape, pattern))
+
+    if not any(map(fits, allowed)):
+        listed = " or ".join(str(pattern).replace("None", "n") for pattern in allowed)
+        raise ValueError(f"{name} has shape {shape}; it must be {listed}")
+
+
+def _shown(values):
+    return " ".join(np.array2string(values, precision=6, threshold=12).split())

@@ -1,0 +1,169 @@
+"""The folder of a training run: ``config.json``, ``metrics.csv``, a checkpoint a saved update.
+
+It belongs to one training process at a time. A process that is killed at any moment leaves a
+folder that ``--resume`` goes on from: files are replaced in one step, never edited in place.
+"""
+
+import contextlib
+import dataclasses
+import json
+import os
+import shutil
+from pathlib import Path
+
+from attjax import settings
+from attjax.settings import Settings
+
+try:
+    import fcntl
+except ImportError:  # Windows, where runs are not kept apart
+    fcntl = None
+
+FORMAT = 4
+CONFIG, METRICS = "config.json", "metrics.csv"
+OWN_FILES = {CONFIG, METRICS, CONFIG + ".tmp", METRICS + ".tmp"}
+
+
+class FolderError(Exception):
+    """A run folder cannot be used; the message is one line for the user."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """What a run was started with."""
+
+    preset: str
+    seed: int
+    settings: Settings
+
+
+@contextlib.contextmanager
+def writing(folder: Path):
+    """Turn the operating system's errors into one line that names the folder."""
+    try:
+        yield
+    except OSError as error:
+        raise FolderError(f"{folder} cannot be written: {error.strerror or error}") from None
+
+
+@contextlib.contextmanager
+def opened(folder: Path):
+    """Make the folder if there is none and keep other training processes out of it.
+
+    The lock is the operating system's, and ends with the process, however that ends.
+
+    Raises:
+        FolderError: another process trains in it, or it is no folder that can be written.
+    """
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    if fcntl is None:
+        yield
+        return
+    with writing(folder):
+        descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise FolderError(
+                f"{folder} is in use by another train.py; wait for it, or choose another folder"
+            ) from None
+        except OSError:  # a file system without locks
+            pass
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def holds_run(folder: Path) -> bool:
+    """Whether a training run was started in the folder."""
+    return (folder / CONFIG).is_file()
+
+
+def create(folder: Path, config: Config, overwrite: bool) -> None:
+    """Prepare a folder for a new run.
+
+    Raises:
+        FolderError: it holds a run and ``overwrite`` is false, holds only something else,
+            or cannot be written. It is left as it was. Other files beside a run that is
+            overwritten stay.
+    """
+    with writing(folder):
+        if holds_run(folder):
+            if not overwrite:
+                raise FolderError(
+                    f"{folder} holds a run already: pass --resume to continue it, "
+                    f"--overwrite to replace it, or another --checkpoint"
+                )
+            _read_json(folder / CONFIG)
+            _remove_run(folder)
+        elif any(path.name not in OWN_FILES for path in folder.iterdir()):
+            raise FolderError(
+                f"{folder} is not empty and holds no attjax run; choose another folder"
+            )
+        write_config(folder, config)
+
+
+def write_config(folder: Path, config: Config) -> None:
+    """Write config.json."""
+    content = {"program": "attjax", "format": FORMAT, **dataclasses.asdict(config)}
+    replace(folder / CONFIG, json.dumps(content, indent=2) + "\n")
+
+
+def replace(path: Path, text: str) -> None:
+    """Write a file in one step: whoever reads it finds the old text or the new one."""
+    temporary = path.with_name(path.name + ".tmp")
+    temporary.write_text(text)
+    os.replace(temporary, path)
+
+
+def read_config(folder: Path) -> Config:
+    """What the run in the folder was started with.
+
+    Raises:
+        FolderError: the folder is missing, or holds no run of this program and format.
+    """
+    path = Path(folder) / CONFIG
+    if not Path(folder).is_dir():
+        raise FolderError(f"there is no checkpoint folder {folder}")
+    if not path.is_file():
+        raise FolderError(f"{folder} is no attjax checkpoint: it has no {CONFIG}")
+    content = _read_json(path)
+    try:
+        if content["format"] != FORMAT:
+            raise FolderError(
+                f"{path} has format {content['format']}; this version of attjax reads {FORMAT}"
+            )
+        return Config(
+            str(content["preset"]), int(content["seed"]), settings.from_json(content["settings"])
+        )
+    except (ValueError, KeyError, TypeError, OverflowError) as error:
+        raise FolderError(f"{path} cannot be read: {error!r}") from None
+
+
+def _read_json(path):
+    try:
+        content = json.loads(path.read_text())
+    except (OSError, ValueError, RecursionError) as error:
+        raise FolderError(f"{path} cannot be read: {error}") from None
+    if not isinstance(content, dict) or content.get("program") != "attjax":
+        raise FolderError(f"{path} was written by another program")
+    return content
+
+
+def _remove_run(folder):
+    """Remove all but config.json, which a new one replaces in the end.
+
+    A checkpoint is renamed first: half removed under its own name it would pass for a whole one.
+    """
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and path.name.split(".")[0].isdigit():
+            removed = path
+            if path.name.isdigit():
+                removed = path.with_name(path.name + ".removed")
+                shutil.rmtree(removed, ignore_errors=True)
+                path.rename(removed)
+            shutil.rmtree(removed)
+        elif path.name in OWN_FILES - {CONFIG}:
+            path.unlink()

@@ -1,0 +1,127 @@
+"""A training run: blocks of updates, and between them metrics, checkpoints and signals."""
+
+import sys
+import time
+from pathlib import Path
+
+import jax
+
+from attjax import assembly, checkpoint, cli, learner, ppo, progress
+from attjax.run_folder import Config
+from attjax.settings import Settings
+
+DIVERGED = 3
+
+
+class Run:
+    """A training run in its folder, at its start or at its newest checkpoint.
+
+    Args:
+        folder: where its checkpoints and metrics are; open.
+        config: what it was started with.
+        stop: says when to end after a block.
+
+    Raises:
+        FolderError: the folder's checkpoint or metrics cannot be read.
+    """
+
+    def __init__(self, folder: Path, config: Config, stop: cli.StopSignals):
+        self.folder, self.config, self.settings, self.stop = folder, config, config.settings, stop
+        self.setup = assembly.setup(self.settings, assembly.num_devices(self.settings))
+        self.env_params = assembly.env_params(self.setup)
+        self.learner = learner.init(self.setup, self.env_params, jax.random.key(config.seed))
+        if checkpoint.latest(folder) is not None:
+            self.learner = checkpoint.restore_learner(folder, self.learner)
+        self.update = int(self.learner.update)
+        self.metrics_file = progress.MetricsFile(folder, self.agent_steps)
+        self.terminal_error = None
+
+    @property
+    def agent_steps(self) -> int:
+        """Agent steps done."""
+        return self.update * self.settings.steps_per_update
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether there is another block to run."""
+        return self.update < self.settings.num_updates and self.stop.received is None
+
+    def describe(self, device) -> None:
+        """Print what the run is, and where it stands."""
+        settings = self.settings
+        print(
+            f"preset {self.config.preset}, seed {self.config.seed}, "
+            f"{settings.num_updates * settings.steps_per_update:,} agent steps "
+            f"({settings.num_updates:,} updates of {settings.steps_per_update:,}) on "
+            f"{self.setup.num_devices} x {device.device_kind} ({device.platform}), in {self.folder}"
+        )
+        if self.update:
+            print(f"resumed at {self.agent_steps:,} agent steps")
+
+    def announce_longer(self, before: Settings) -> None:
+        """Print what a larger total than ``before``'s changes from here on."""
+        steps = self.update * self.settings.passes * self.settings.minibatches
+        old, new = (learner.learning_rate(s, steps) for s in (before, self.settings))
+        print(
+            f"total steps raised from {before.total_steps:,} to {self.settings.total_steps:,}: "
+            f"at {self.agent_steps:,} the learning rate goes from {old:.3g} to {new:.3g}, and from "
+            f"there to {self.settings.final_learning_rate:.3g} at the new end; the entropy bonus "
+            f"likewise"
+        )
+
+    def train(self, save_every_s: float) -> int:
+        """Train to the end, or to a signal; returns the exit status.
+
+        Raises:
+            FolderError: the folder cannot be written. Its checkpoints are as they were.
+        """
+        train_block = self._compiled() if self.goes_on else None
+        total = self.settings.num_updates * self.settings.steps_per_update
+        with checkpoint.Saver(self.folder) as saver:
+            with progress.ProgressLine(total, self.agent_steps) as line:
+                diverged = self._loop(train_block, saver, line, save_every_s)
+            if diverged:
+                print(f"train.py: error: {diverged}", file=sys.stderr)
+                return DIVERGED
+            saver.save(self.learner, self.terminal_error)
+        if self.stop.received is not None:
+            print(f"stopped and saved at {self.agent_steps:,} agent steps; continue with --resume")
+            return 128 + self.stop.received
+        print(f"trained; evaluate with: python eval.py --checkpoint {self.folder}")
+        return 0
+
+    def _compiled(self):
+        start = time.monotonic()
+        lowered = ppo.train_block.lower(self.setup, self.env_params, self.learner, 1)
+        train_block = lowered.compile()
+        print(f"compiled in {time.monotonic() - start:.1f} s", flush=True)
+        return train_block
+
+    def _loop(self, train_block, saver, line, save_every_s):
+        """Run blocks until the end or a signal; returns what diverged, if anything."""
+        start, saved = time.monotonic() - self.metrics_file.wall_s, time.monotonic()
+        while self.goes_on:
+            count = min(self.settings.updates_per_block, self.settings.num_updates - self.update)
+            self.learner, metrics = train_block(self.env_params, self.learner, count)
+            diverged = {name: int(update) for name, update in metrics["diverged"].items()}
+            if max(diverged.values()) >= 0:
+                return self._divergence(diverged)
+            self.update += count
+            row = progress.metrics_row(metrics, self.agent_steps, time.monotonic() - start)
+            self.terminal_error = row["terminal_error_deg"]
+            self.metrics_file.append(row)
+            line.show(row)
+            if time.monotonic() - saved > save_every_s:
+                saver.save(self.learner, self.terminal_error)
+                saved = time.monotonic()
+        return None
+
+    def _divergence(self, diverged):
+        """One line that names the first update with something not finite, and what it was."""
+        first = min(update for update in diverged.values() if update >= 0)
+        names = ", ".join(name for name, update in diverged.items() if update == first)
+        steps = (first + 1) * self.settings.steps_per_update
+        return (
+            f"not finite at agent step {steps:,} (update {first}): {names}; "
+            f"{self.folder} keeps the last good checkpoint"
+        )
