@@ -28,6 +28,8 @@ def parse_arguments(argv):
     )
     compare_help = "policy, classical controllers and the paper side by side, on the same slews"
     who.add_argument("--compare", action="store_true", help=compare_help)
+    best_help = "the checkpoint with the least terminal error in training, not the newest"
+    parser.add_argument("--best", action="store_true", help=best_help)
     cli.add_number(parser, "episodes", int, 5000, "number of slews", low=1, high=10**7)
     frameskip_help = "torque-free RK4 steps after an impulse; the control rate is 240/(N + 1) Hz"
     cli.add_number(parser, "frameskip", int, 5, frameskip_help, low=0, below=10_500)
@@ -53,7 +55,7 @@ def main(argv=None) -> int:
 
     names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
     with cli.one_line_errors("eval.py", run_folder.FolderError):
-        controllers = {name: _controller(name, arguments.checkpoint) for name in names}
+        controllers = {name: _controller(name, arguments) for name in names}
         _check_writable(arguments.json)
         plots = _prepare_plots(arguments.plot)
     env = AttitudeEnv(arguments.frameskip)
@@ -97,13 +99,14 @@ def _prepare_plots(folder):
     return plots
 
 
-def _controller(name, folder):
+def _controller(name, arguments):
     import jax
 
     from attjax import checkpoint, controllers
 
     if name == POLICY:
-        return checkpoint.restore_policy(folder)
+        update = checkpoint.best(arguments.checkpoint) if arguments.best else None
+        return checkpoint.restore_policy(arguments.checkpoint, update)
     return jax.tree_util.Partial(controllers.CONTROLLERS[name])
 
 

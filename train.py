@@ -25,6 +25,8 @@ def parse_arguments(argv):
     existing.add_argument("--overwrite", action="store_true", help="replace the folder's run")
     save_help = "seconds between two checkpoints"
     cli.add_number(parser, "save-every", float, 30.0, save_help, low=0)
+    debug_help = "check every operation, and name the first that makes a NaN (slow)"
+    parser.add_argument("--debug-nans", action="store_true", help=debug_help)
     cli.add_settings(parser)
     return parser.parse_args(argv)
 
@@ -61,7 +63,7 @@ def _train(arguments, new, stop, device):
             run.announce_longer(old.settings)
             run_folder.write_config(folder, longer)
     run.describe(device)
-    return run.train(arguments.save_every)
+    return run.train(arguments.save_every, arguments.debug_nans)
 
 
 def _resumed_config(arguments, config):

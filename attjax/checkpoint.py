@@ -5,6 +5,7 @@ all that training needs to go on. Orbax writes them beside and renames them when
 """
 
 import functools
+import json
 import re
 import shutil
 import sys
@@ -46,9 +47,7 @@ class Saver:
         for leftover in self._folder.glob("[0-9]*.orbax-checkpoint-tmp*"):
             shutil.rmtree(leftover, ignore_errors=True)
         newest = checkpoint_managers.LatestN(NEWEST_KEPT)
-        best = checkpoint_managers.BestN(
-            get_metric_fn=_error, reverse=True, n=1, keep_checkpoints_without_metrics=False
-        )
+        best = checkpoint_managers.BestN(get_metric_fn=_error, reverse=True, n=1)
         self._manager = ocp.CheckpointManager(
             self._folder.absolute(),
             options=ocp.CheckpointManagerOptions(
@@ -69,6 +68,10 @@ class Saver:
     def save(self, learner: Learner, terminal_error: float | None = None) -> None:
         """Save at once; a checkpoint of the same update is left as it is.
 
+        Args:
+            learner: what to save.
+            terminal_error: of the episodes that ended last, degrees; None if none did.
+
         Raises:
             FolderError: it cannot be written. Those saved before are as they were.
         """
@@ -79,7 +82,7 @@ class Saver:
             policy=ocp.args.StandardSave(learner.params["policy"]),
             learner=ocp.args.StandardSave(_storable(learner)),
         )
-        metrics = None if terminal_error is None else {BEST_BY: terminal_error}
+        metrics = {BEST_BY: float("inf") if terminal_error is None else terminal_error}
         try:
             self._manager.save(update, args=items, metrics=metrics)
         except Exception as error:  # Orbax raises many kinds, for a full disk among others
@@ -89,7 +92,27 @@ class Saver:
 
 def latest(folder: Path) -> int | None:
     """The newest saved update, None if nothing was saved yet."""
-    return max(ocp.utils.checkpoint_steps(Path(folder).absolute()), default=None)
+    return max(_saved(folder), default=None)
+
+
+def best(folder: Path) -> int | None:
+    """The saved update with the least terminal error, None if nothing was saved yet.
+
+    Raises:
+        FolderError: the error of one cannot be read.
+    """
+    errors = {}
+    for update in _saved(folder):
+        path = Path(folder) / str(update) / "metrics" / "metrics"
+        try:
+            errors[update] = _error(json.loads(path.read_text()))
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise FolderError(f"{path} cannot be read: {error!r}") from None
+    return min(errors, key=errors.get, default=None)
+
+
+def _saved(folder):
+    return ocp.utils.checkpoint_steps(Path(folder).absolute())
 
 
 def restore_learner(folder: Path, template: Learner) -> Learner:
@@ -100,13 +123,13 @@ def restore_learner(folder: Path, template: Learner) -> Learner:
     Raises:
         FolderError: the folder holds no checkpoint, an unreadable one or one of another run.
     """
-    restored = _restore(folder, "learner", _storable(template))
+    restored = _restore(folder, latest(folder), "learner", _storable(template))
     implementation = jax.random.key_impl(template.key)
     return restored.replace(key=jax.random.wrap_key_data(restored.key, impl=implementation))
 
 
-def restore_policy(folder: Path) -> jax.tree_util.Partial:
-    """The newest saved policy as ``act(observation, context) -> action``.
+def restore_policy(folder: Path, update: int | None = None) -> jax.tree_util.Partial:
+    """A saved policy, the newest by default, as ``act(observation, context) -> action``.
 
     It is placed on the default device wherever it was trained.
 
@@ -115,12 +138,11 @@ def restore_policy(folder: Path) -> jax.tree_util.Partial:
     """
     policy = assembly.policy(run_folder.read_config(folder).settings)
     template = jax.eval_shape(functools.partial(assembly.initial_parameters, policy))["policy"]
-    params = _restore(folder, "policy", template)
+    params = _restore(folder, latest(folder) if update is None else update, "policy", template)
     return jax.tree_util.Partial(policy.act, {"policy": params})
 
 
-def _restore(folder, item, template):
-    update = latest(folder)
+def _restore(folder, update, item, template):
     if update is None:
         raise FolderError(f"{folder} holds no checkpoint yet")
     path = (Path(folder) / str(update) / item).absolute()
@@ -135,7 +157,7 @@ def _restore(folder, item, template):
         except Exception as error:  # Orbax raises many kinds for damaged files
             reason = _first_sentence(error)
     advice = ""
-    if len(ocp.utils.checkpoint_steps(Path(folder).absolute())) > 1:
+    if len(_saved(folder)) > 1:
         advice = f"; remove {path.parent} to go back to the checkpoint before it"
     raise FolderError(f"checkpoint {path} cannot be read: {reason}{advice}")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import jax
 
-from attjax import assembly, checkpoint, cli, learner, ppo, progress
+from attjax import assembly, checkpoint, cli, learner, nan_search, ppo, progress
 from attjax.run_folder import Config
 from attjax.settings import Settings
 
@@ -69,13 +69,13 @@ class Run:
             f"likewise"
         )
 
-    def train(self, save_every_s: float) -> int:
+    def train(self, save_every_s: float, debug_nans: bool = False) -> int:
         """Train to the end, or to a signal; returns the exit status.
 
         Raises:
             FolderError: the folder cannot be written. Its checkpoints are as they were.
         """
-        train_block = self._compiled() if self.goes_on else None
+        train_block = self._compiled(debug_nans) if self.goes_on else None
         total = self.settings.num_updates * self.settings.steps_per_update
         with checkpoint.Saver(self.folder) as saver:
             with progress.ProgressLine(total, self.agent_steps) as line:
@@ -90,10 +90,13 @@ class Run:
         print(f"trained; evaluate with: python eval.py --checkpoint {self.folder}")
         return 0
 
-    def _compiled(self):
+    def _compiled(self, debug_nans):
         start = time.monotonic()
-        lowered = ppo.train_block.lower(self.setup, self.env_params, self.learner, 1)
-        train_block = lowered.compile()
+        arguments = self.setup, self.env_params, self.learner
+        if debug_nans:
+            train_block = nan_search.train_block(*arguments)
+        else:
+            train_block = ppo.train_block.lower(*arguments, 1).compile()
         print(f"compiled in {time.monotonic() - start:.1f} s", flush=True)
         return train_block
 
@@ -102,10 +105,15 @@ class Run:
         start, saved = time.monotonic() - self.metrics_file.wall_s, time.monotonic()
         while self.goes_on:
             count = min(self.settings.updates_per_block, self.settings.num_updates - self.update)
-            self.learner, metrics = train_block(self.env_params, self.learner, count)
+            try:
+                self.learner, metrics = train_block(self.env_params, self.learner, count)
+            except nan_search.NotFinite as found:
+                return self._divergence(self.update, count, str(found))
             diverged = {name: int(update) for name, update in metrics["diverged"].items()}
             if max(diverged.values()) >= 0:
-                return self._divergence(diverged)
+                first = min(update for update in diverged.values() if update >= 0)
+                names = ", ".join(name for name, update in diverged.items() if update == first)
+                return self._divergence(first, 1, names)
             self.update += count
             row = progress.metrics_row(metrics, self.agent_steps, time.monotonic() - start)
             self.terminal_error = row["terminal_error_deg"]
@@ -116,12 +124,10 @@ class Run:
                 saved = time.monotonic()
         return None
 
-    def _divergence(self, diverged):
-        """One line that names the first update with something not finite, and what it was."""
-        first = min(update for update in diverged.values() if update >= 0)
-        names = ", ".join(name for name, update in diverged.items() if update == first)
-        steps = (first + 1) * self.settings.steps_per_update
-        return (
-            f"not finite at agent step {steps:,} (update {first}): {names}; "
-            f"{self.folder} keeps the last good checkpoint"
-        )
+    def _divergence(self, update, count, what):
+        """One line that says in which of the updates what was not finite."""
+        steps = (update + count) * self.settings.steps_per_update
+        updates = f"update {update}" if count == 1 else f"updates {update} to {update + count - 1}"
+        kept = checkpoint.latest(self.folder)
+        kept = "no checkpoint yet" if kept is None else f"the good one of update {kept}"
+        return f"not finite at agent step {steps:,} ({updates}): {what}; {self.folder} has {kept}"

@@ -34,6 +34,13 @@ def parse_arguments(argv):
     common.add_num_envs(parser, NUM_ENVS)
     cli.add_number(parser, "repeats", int, 7, "measurements of each figure", low=1)
     cli.add_number(parser, "cores", int, 2, "compare one core and that many", low=1)
+    parser.add_argument(
+        "--minibatch-size",
+        type=common.positive_integers,
+        default=[1024, 2048],
+        metavar="N,N,...",
+        help="of the trainings (default: 1024,2048)",
+    )
     parser.add_argument("--no-training", action="store_true", help="the simulator only")
     parser.add_argument("--child", type=json.loads, help=argparse.SUPPRESS)
     return parser.parse_args(argv)
@@ -59,8 +66,9 @@ def main(argv=None) -> int:
     training = []
     if not arguments.no_training:
         training = [
-            start_child(kind="training", hidden_sizes=sizes, cores=c)
+            start_child(kind="training", hidden_sizes=sizes, minibatch_size=size, cores=c)
             for sizes in NETWORKS
+            for size in arguments.minibatch_size
             for c in cores
         ]
         print_training(training, arguments.cores)
@@ -112,13 +120,14 @@ def fly(num_envs: int, cores: int, repeats: int) -> dict:
     return {"compile_s": flight.compile_s, **common.summary(rates)}
 
 
-def train(hidden_sizes: list[int], cores: int) -> dict:
+def train(hidden_sizes: list[int], minibatch_size: int, cores: int) -> dict:
     """Throughput of training with the default preset, in blocks of one update."""
     import jax
 
     from attjax import assembly, learner, ppo, presets
 
-    settings = dataclasses.replace(presets.PRECISE, hidden_sizes=tuple(hidden_sizes))
+    changes = {"hidden_sizes": tuple(hidden_sizes), "minibatch_size": minibatch_size}
+    settings = dataclasses.replace(presets.PRECISE, **changes)
     setup = assembly.setup(settings, num_devices=cores)
     env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(0))
@@ -147,12 +156,13 @@ def print_simulator(rows: list[dict], cores: int) -> None:
 def print_training(rows: list[dict], cores: int) -> None:
     """Print throughput of training against networks and cores."""
     print("\nTraining, default preset")
-    columns = ["hidden\nlayers", *SPEED_COLUMNS]
+    columns = ["hidden\nlayers", "mini-\nbatch", *SPEED_COLUMNS]
     columns += [f"{cores} cores\nover 1", "peak\nMiB"]
     cells = []
     for row in rows:
         name = "-".join(map(str, row["hidden_sizes"]))
-        cells.append([name, *_speed(row), *_gain(rows, row, "hidden_sizes")])
+        gain = _gain(rows, row, "hidden_sizes", "minibatch_size")
+        cells.append([name, str(row["minibatch_size"]), *_speed(row), *gain])
     common.print_table(columns, cells, [MEMORY_NOTE])
 
 
@@ -166,9 +176,9 @@ def _speed(row):
     ]
 
 
-def _gain(rows, row, key):
+def _gain(rows, row, *keys):
     """Ratio to the same on one core, and peak memory."""
-    one = next(r for r in rows if r["cores"] == 1 and r[key] == row[key])
+    one = next(r for r in rows if r["cores"] == 1 and all(r[k] == row[k] for k in keys))
     gain = "" if row["cores"] == 1 else f"{row['median'] / one['median']:.2f}"
     return [gain, f"{row['peak_bytes'] / MEBIBYTE:,.0f}"]
 

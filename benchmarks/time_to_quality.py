@@ -30,7 +30,8 @@ RECIPES = {
     "paper-fast": ["--preset", "paper-fast"],
     "paper-fast, multiscale 64-64": [
         "--preset", "paper-fast", "--features", "multiscale", "--hidden-sizes", "64,64",
-        "--learning-rate", "1e-3",
+        "--num-envs", "256", "--rollout-length", "64", "--minibatch-size", "1024",
+        "--learning-rate", "2e-3", "--total-steps", "3000000",
     ],
     "paper": ["--preset", "paper"],
 }  # fmt: skip

@@ -1,5 +1,4 @@
 import dataclasses
-import json
 import shutil
 
 import jax
@@ -39,10 +38,6 @@ def trained(tmp_path_factory):
 def copy(learner_state):
     """The block donates its argument."""
     return jax.tree.map(lambda x: x.copy(), learner_state)
-
-
-def test_config_round_trip(trained):
-    assert run_folder.read_config(trained[0]) == CONFIG
 
 
 def test_restored_learner_is_the_saved_one_and_goes_on_bitwise(trained):
@@ -93,53 +88,6 @@ def test_float32_policy_serves_a_float64_simulation(trained, x64):
     assert 0 <= int(act(observation, env.context(env.default_params))) < 19
 
 
-def test_a_run_is_not_overwritten_unless_asked(trained):
-    folder = trained[0]
-    before = sorted(p.name for p in folder.rglob("*"))
-    with pytest.raises(FolderError, match=r"--resume .* --overwrite"):
-        run_folder.create(folder, CONFIG, overwrite=False)
-    assert sorted(p.name for p in folder.rglob("*")) == before
-
-
-def test_overwrite_removes_the_run_and_nothing_else(tmp_path):
-    run_folder.create(tmp_path, CONFIG, overwrite=False)
-    (tmp_path / "7").mkdir()
-    (tmp_path / "metrics.csv").write_text("x")
-    (tmp_path / "metrics.csv.tmp").write_text("x")
-    (tmp_path / "figure.png").write_text("precious")
-    run_folder.create(tmp_path, CONFIG, overwrite=True)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["config.json", "figure.png"]
-
-
-def test_folders_with_other_files_are_refused_and_kept(tmp_path):
-    (tmp_path / "thesis.tex").write_text("precious")
-    for overwrite in (False, True):
-        with pytest.raises(FolderError, match="not empty"):
-            run_folder.create(tmp_path, CONFIG, overwrite)
-    assert (tmp_path / "thesis.tex").read_text() == "precious"
-
-
-def edited(tmp_path, **changes):
-    run_folder.create(tmp_path, CONFIG, overwrite=False)
-    path = tmp_path / "config.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
-    return tmp_path
-
-
-@pytest.mark.parametrize(
-    "changes, message",
-    [
-        ({"program": "other"}, "another program"),
-        ({"format": 99}, "format 99"),
-        ({"settings": {}}, "unknown or missing"),
-        ({"seed": None}, "cannot be read"),
-    ],
-)
-def test_foreign_configurations_are_refused(tmp_path, changes, message):
-    with pytest.raises(FolderError, match=message):
-        run_folder.read_config(edited(tmp_path, **changes))
-
-
 def test_missing_empty_and_truncated_folders_are_refused(tmp_path, trained):
     with pytest.raises(FolderError, match="no checkpoint folder"):
         checkpoint.restore_policy(tmp_path / "nowhere")
@@ -151,6 +99,60 @@ def test_missing_empty_and_truncated_folders_are_refused(tmp_path, trained):
     (tmp_path / "config.json").write_text("{")
     with pytest.raises(FolderError, match="cannot be read"):
         checkpoint.restore_policy(tmp_path)
+
+
+def saved_errors(folder, state, errors):
+    with checkpoint.Saver(folder) as saver:
+        for update, error in enumerate(errors, 1):
+            saver.save(state.replace(update=np.int32(update)), error)
+
+
+def test_the_newest_three_and_the_best_are_kept(trained, tmp_path):
+    run_folder.create(tmp_path, CONFIG, overwrite=False)
+    errors = [9.0, 0.5, None, 7.0, 0.6, 5.0, 4.0]
+    saved_errors(tmp_path, trained[3], errors[:4])
+    saved_errors(tmp_path, trained[3], errors)  # as a resumed run does: it knows them again
+    assert sorted(int(p.name) for p in tmp_path.iterdir() if p.is_dir()) == [2, 5, 6, 7]
+    assert (checkpoint.latest(tmp_path), checkpoint.best(tmp_path)) == (7, 2)
+    jax.tree.map(
+        np.testing.assert_array_equal,
+        checkpoint.restore_policy(tmp_path, checkpoint.best(tmp_path)).args[0]["policy"],
+        trained[3].params["policy"],
+    )
+
+
+def test_other_networks_are_refused_in_one_line(trained, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(trained[0], folder)
+    for sizes in ((16,), (8, 8)):
+        settings = dataclasses.replace(SETTINGS, hidden_sizes=sizes)
+        run_folder.write_config(folder, dataclasses.replace(CONFIG, settings=settings))
+        with pytest.raises(FolderError, match="cannot be read") as error:
+            checkpoint.restore_policy(folder)
+        assert "\n" not in str(error.value)
+
+
+def test_half_written_checkpoints_are_cleared_away(trained, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(trained[0], folder)
+    (folder / "7.orbax-checkpoint-tmp" / "policy").mkdir(parents=True)
+    assert checkpoint.latest(folder) == 2
+    with checkpoint.Saver(folder):
+        assert sorted(p.name for p in folder.iterdir()) == ["2", "config.json"]
+
+
+def test_a_checkpoint_that_cannot_be_written_leaves_those_before(trained, tmp_path, monkeypatch):
+    folder = tmp_path / "run"
+    shutil.copytree(trained[0], folder)
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    with checkpoint.Saver(folder) as saver:
+        monkeypatch.setattr(saver._manager, "save", full)
+        with pytest.raises(FolderError, match="No space left on device"):
+            saver.save(trained[3].replace(update=np.int32(9)))
+    assert checkpoint.latest(folder) == 2
 
 
 def test_damaged_checkpoints_are_refused_in_one_line(trained, tmp_path):

@@ -16,7 +16,7 @@ LAYERS = [
     {"learner", "evaluation"},
     {"rollout", "descent"},
     {"ppo"},
-    {"presets", "assembly", "run_folder"},
+    {"presets", "assembly", "run_folder", "nan_search"},
     {"progress", "report", "cli"},
     {"checkpoint"},
     {"training", "plots"},

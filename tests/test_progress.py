@@ -51,6 +51,25 @@ def test_resuming_drops_the_rows_after_the_checkpoint(tmp_path):
     assert [row["wall_s"] for row in rows_of(tmp_path)] == ["10", "20", "31"]
 
 
+def test_a_row_that_was_cut_off_is_left_out(tmp_path):
+    file = progress.MetricsFile(tmp_path, resume_at=0)
+    for steps in (100, 200):
+        file.append({"agent_steps": steps, "wall_s": steps / 10})
+    path = tmp_path / run_folder.METRICS
+    path.write_text(path.read_text() + "20")  # of 200 to 300: would pass for the 20th step
+    progress.MetricsFile(tmp_path, resume_at=200)
+    assert [row["agent_steps"] for row in rows_of(tmp_path)] == ["100", "200"]
+
+
+@pytest.mark.parametrize("text", ["a,b\n1,2\n", "\x00\n\x01\n", "agent_steps\n1\n"])
+def test_files_that_are_no_metrics_are_refused_and_kept(tmp_path, text):
+    path = tmp_path / run_folder.METRICS
+    path.write_text(text)
+    with pytest.raises(run_folder.FolderError, match=r"metrics\.csv cannot be read"):
+        progress.MetricsFile(tmp_path, resume_at=10)
+    assert path.read_text() == text
+
+
 def test_plain_lines_where_there_is_no_terminal(capsys):
     row = {
         "agent_steps": 500_000, "episode_return": None, "success_rate": 0.5,
