@@ -12,7 +12,7 @@ import sys
 import time
 from pathlib import Path
 
-from attjax import cli
+from attjax import cli, run_folder
 
 POLICY = "policy"
 CLASSICAL = ("phase-plane", "feedback")
@@ -43,21 +43,26 @@ def parse_arguments(argv):
 def main(argv=None) -> int:
     """Evaluate a checkpoint or a classical controller; returns the exit status."""
     arguments = parse_arguments(argv)
-    with cli.one_line_errors("eval.py"):
+    advice = "fewer --episodes take less"
+    with cli.one_line_errors("eval.py", run_folder.FolderError), cli.enough_memory(advice):
         cli.select_device(arguments.device)
         steps = _episode_steps(arguments.duration, arguments.frameskip)
+        names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
+        controllers = {name: _controller(name, arguments) for name in names}
+        _check_writable(arguments.json)
+        plots = _prepare_plots(arguments.plot)
+        metrics = _metrics(arguments.checkpoint) if plots and POLICY in controllers else []
+        return _evaluate(arguments, controllers, steps, plots, metrics)
 
+
+def _evaluate(arguments, controllers, steps, plots, metrics):
+    """Fly, print, draw and write."""
     # Imported late: with them, --help and errors in the arguments would take seconds.
     import jax
     import jax.numpy as jnp
 
-    from attjax import AttitudeEnv, evaluation, report, run_folder
+    from attjax import AttitudeEnv, evaluation, report
 
-    names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
-    with cli.one_line_errors("eval.py", run_folder.FolderError):
-        controllers = {name: _controller(name, arguments) for name in names}
-        _check_writable(arguments.json)
-        plots = _prepare_plots(arguments.plot)
     env = AttitudeEnv(arguments.frameskip)
     params = env.default_params.replace(max_steps_in_episode=jnp.array(steps, jnp.int32))
     start = time.monotonic()
@@ -70,8 +75,7 @@ def main(argv=None) -> int:
         if plots:
             folder = arguments.plot / name if arguments.compare else arguments.plot
             flight = plots.Flight(controller, env, params, seed, flown)
-            metrics = arguments.checkpoint / run_folder.METRICS if name == POLICY else None
-            for path in plots.write_all(flight, folder, metrics):
+            for path in plots.write_all(flight, folder, metrics if name == POLICY else []):
                 print(f"wrote {path}")
     if arguments.compare:
         report.print_comparison(results)
@@ -80,8 +84,16 @@ def main(argv=None) -> int:
     print(f"evaluated in {time.monotonic() - start:.1f} s, compilation included")
     if arguments.json:
         content = {"controllers": results} if arguments.compare else results[0]
-        arguments.json.write_text(json.dumps(content, indent=2) + "\n")
+        with run_folder.writing(arguments.json):
+            arguments.json.write_text(json.dumps(content, indent=2) + "\n")
     return 0
+
+
+def _metrics(folder):
+    """The rows of the run's metrics.csv, for the learning curve."""
+    from attjax import progress
+
+    return progress.read_rows(folder / run_folder.METRICS)
 
 
 def _prepare_plots(folder):

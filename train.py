@@ -39,7 +39,8 @@ def main(argv=None) -> int:
         new = dataclasses.replace(presets.PRESETS[preset], **cli.overrides(arguments))
     with cli.StopSignals() as stop, cli.one_line_errors("train.py", run_folder.FolderError):
         device = cli.select_device(arguments.device)
-        with run_folder.opened(arguments.checkpoint):
+        advice = "fewer --num-envs or a shorter --rollout-length take less"
+        with run_folder.opened(arguments.checkpoint), cli.enough_memory(advice):
             return _train(
                 arguments, run_folder.Config(preset, arguments.seed or 0, new), stop, device
             )

@@ -46,6 +46,17 @@ def _fail(prog, message):
     sys.exit(BAD_INPUT)
 
 
+@contextlib.contextmanager
+def enough_memory(advice: str):
+    """Turn JAX's errors about memory into a :class:`UserError` with this advice."""
+    try:
+        yield
+    except Exception as error:
+        if "RESOURCE_EXHAUSTED" not in str(error):
+            raise
+        raise UserError(f"the memory does not suffice; {advice}") from None
+
+
 class StopSignals:
     """Notes SIGINT and SIGTERM, for the work to end where it can go on; a context manager.
 

@@ -1,6 +1,5 @@
 """Figures of an evaluation, written as PNG files. Needs the extra ``plot`` (matplotlib)."""
 
-import csv
 import dataclasses
 import functools
 from pathlib import Path
@@ -87,8 +86,11 @@ class Flight:
         return np.arange(1, steps + 1) * self.env.control_period, history
 
 
-def write_all(flight: Flight, folder: Path, metrics: Path | None) -> list[Path]:
-    """Write every figure into the folder, the learning curve too where there are metrics."""
+def write_all(flight: Flight, folder: Path, metrics: list[dict]) -> list[Path]:
+    """Write every figure into the folder, the learning curve too where there are metrics.
+
+    ``metrics`` are rows of a run's metrics.csv, as strings.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     paths = [
         *slews(flight, folder),
@@ -97,7 +99,7 @@ def write_all(flight: Flight, folder: Path, metrics: Path | None) -> list[Path]:
         distributions(flight, folder),
         settling(flight, folder),
     ]
-    if metrics is not None and metrics.is_file():
+    if metrics:
         paths.append(learning_curve(metrics, folder))
     return paths
 
@@ -219,10 +221,9 @@ def settling(flight: Flight, folder: Path) -> Path:
     return _save(figure, folder, "settling")
 
 
-def learning_curve(metrics: Path, folder: Path) -> Path:
-    """Return, success and terminal error over agent steps, from a run's metrics.csv."""
-    with metrics.open(newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["episode_return"]]
+def learning_curve(metrics: list[dict], folder: Path) -> Path:
+    """Return, success and terminal error over agent steps, from a run's metrics."""
+    rows = [row for row in metrics if row["episode_return"]]
     steps = [int(row["agent_steps"]) / 1e6 for row in rows]
     columns = (
         ("episode_return", "return (Eq. 12–13)"),

@@ -51,7 +51,7 @@ class MetricsFile:
             FolderError: it cannot be read or written, or its rows are no rows of metrics.
         """
         self._folder, self._path = folder, folder / run_folder.METRICS
-        rows = [row for row in _read_rows(self._path) if int(row["agent_steps"]) <= resume_at]
+        rows = [row for row in read_rows(self._path) if int(row["agent_steps"]) <= resume_at]
         self.wall_s = float(rows[-1]["wall_s"]) if rows else 0.0
         with run_folder.writing(folder):
             run_folder.replace(self._path, _csv_text(rows, header=True))
@@ -66,8 +66,12 @@ class MetricsFile:
             file.write(_csv_text([{k: _cell(v) for k, v in row.items()}]))
 
 
-def _read_rows(path):
-    """The rows of a file that need not exist; one whose writing was cut off is left out."""
+def read_rows(path: Path) -> list[dict]:
+    """The rows of a metrics.csv that need not exist; one that was cut off is left out.
+
+    Raises:
+        FolderError: they are no rows of metrics.
+    """
     if not path.exists():
         return []
     try:
@@ -76,7 +80,8 @@ def _read_rows(path):
         for row in rows:
             if set(row) != set(COLUMNS) or None in row.values():
                 raise ValueError(f"a row has other columns than {','.join(COLUMNS[:3])}...")
-            int(row["agent_steps"]), float(row["wall_s"])
+            int(row["agent_steps"])
+            [float(cell) for cell in (row["wall_s"], *filter(None, row.values()))]
     except (OSError, ValueError, csv.Error) as error:
         raise run_folder.FolderError(
             f"{path} cannot be read: {error}; without it, the run goes on and begins a new one"

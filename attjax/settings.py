@@ -6,10 +6,14 @@ This module imports nothing heavy, so that ``--help`` is instant.
 import dataclasses
 import math
 
+MOST_SAMPLES = 2**27
+"""Of an update: some 100 GB."""
+
 
 def setting(help: str, **limits):
     """A field without default. ``limits``: ``choices``, or ``low``, ``high`` (inclusive),
-    ``above`` and ``below`` (exclusive), of each element where the field is a tuple.
+    ``above`` and ``below`` (exclusive), of each element where the field is a tuple, and ``most``
+    elements.
     """
     return dataclasses.field(metadata={"help": help, **limits})
 
@@ -28,6 +32,7 @@ class Settings:
         "among several values",
         low=0,
         below=10_500,
+        most=64,
     )
     reward: str = setting(
         "Eq. 12-13 with terminal rewards, or -log10 of the error angle",
@@ -38,14 +43,14 @@ class Settings:
         "learn the time limit as an end, as the paper did; otherwise bootstrap there"
     )
     max_episode_steps: int = setting(
-        "cap on an episode's agent steps in training, beside its 43.75 s", low=1
+        "cap on an episode's agent steps in training, beside its 43.75 s", low=1, high=10_500
     )
     near_goal_share: float = setting(
         "share of the training episodes that start near the goal, at any scale, and are short",
         low=0,
         below=1,
     )
-    near_goal_steps: int = setting("agent steps of such an episode", low=1)
+    near_goal_steps: int = setting("agent steps of such an episode", low=1, high=10_500)
     stagger_episodes: bool = setting(
         "start the first episodes at random times, so that they do not end all at once"
     )
@@ -55,7 +60,9 @@ class Settings:
         "network inputs: Eq. 11 as it is, or tanh(k x) of attitude and rate at nine scales",
         choices=("state", "multiscale"),
     )
-    hidden_sizes: tuple[int, ...] = setting("neurons of each hidden layer (Table 3)", low=1)
+    hidden_sizes: tuple[int, ...] = setting(
+        "neurons of each hidden layer (Table 3)", low=1, high=8192, most=8
+    )
     rate_margin: float = setting(
         "mask actions after which coasting would pass this fraction of the rate limit; 0: no mask",
         low=0,
@@ -63,15 +70,19 @@ class Settings:
     )
 
     # PPO
-    total_steps: int = setting("agent steps in the whole run, rounded up to whole updates", low=1)
-    num_envs: int = setting("spacecraft simulated side by side", low=1)
+    total_steps: int = setting(
+        "agent steps in the whole run, rounded up to whole updates", low=1, high=10**13
+    )
+    num_envs: int = setting("spacecraft simulated side by side", low=1, high=2**22)
     greedy_share: float = setting(
         "share of the spacecraft that act greedily, as in flight, while the others explore",
         low=0,
         below=1,
     )
-    rollout_length: int = setting("agent steps of each spacecraft between two updates", low=1)
-    passes: int = setting("passes over the data of an update (N)", low=1)
+    rollout_length: int = setting(
+        "agent steps of each spacecraft between two updates", low=1, high=2**16
+    )
+    passes: int = setting("passes over the data of an update (N)", low=1, high=1000)
     minibatch_size: int = setting("samples in a gradient step", low=1)
     discount: float = setting("discount (gamma)", above=0, high=1)
     discount_period: float = setting(
@@ -86,7 +97,7 @@ class Settings:
     normalize_advantage: bool = setting("standardise the advantages of each minibatch")
     max_gradient_norm: float = setting("clip each network's gradient norm; 0: do not", low=0)
     updates_per_block: int = setting(
-        "updates between two progress lines, each a row of metrics.csv", low=1
+        "updates between two progress lines, each a row of metrics.csv", low=1, high=10**6
     )
 
     def __post_init__(self):
@@ -101,6 +112,17 @@ class Settings:
             raise ValueError(
                 f"minibatch_size is {self.minibatch_size}; it must be at most "
                 f"num_envs x rollout_length = {self.steps_per_update}"
+            )
+        if self.steps_per_update > MOST_SAMPLES:
+            raise ValueError(
+                f"num_envs x rollout_length is {self.steps_per_update}; "
+                f"it must be at most {MOST_SAMPLES}"
+            )
+        if self.num_updates * self.passes * self.minibatches >= 2**31:
+            raise ValueError(
+                f"total_steps is {self.total_steps}; with these passes and minibatches that makes "
+                f"{self.num_updates * self.passes * self.minibatches} gradient steps, and they "
+                f"must be fewer than 2^31"
             )
 
     @property
@@ -137,7 +159,7 @@ def check(field: dataclasses.Field, value) -> None:
     is_tuple = field.type == tuple[int, ...]
     kind = int if is_tuple else field.type
     elements = value if is_tuple else (value,)
-    fits = isinstance(elements, tuple) and len(elements) > 0
+    fits = isinstance(elements, tuple) and 0 < len(elements) <= field.metadata.get("most", math.inf)
     if not (fits and all(_fits(kind, field.metadata, x) for x in elements)):
         name = {int: "an integer", float: "a number", bool: "true or false"}.get(kind, "")
         allowed = ["integers" if is_tuple else name, _describe(field.metadata)]
@@ -160,4 +182,5 @@ def _describe(limits):
     if "choices" in limits:
         return "one of " + ", ".join(limits["choices"])
     words = {"low": "at least", "above": "above", "high": "at most", "below": "below"}
-    return " and ".join(f"{word} {limits[k]}" for k, word in words.items() if k in limits)
+    described = " and ".join(f"{word} {limits[k]}" for k, word in words.items() if k in limits)
+    return described + (f", {limits['most']} of them at most" if "most" in limits else "")

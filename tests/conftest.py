@@ -3,6 +3,7 @@ import pytest
 from commands import STEPS_PER_UPDATE, TINY, run
 
 jax.config.update("jax_num_cpu_devices", 2)  # what is shared out over devices is tested on two
+jax.config.update("jax_legacy_prng_key", "error")  # typed keys throughout
 
 
 @pytest.fixture

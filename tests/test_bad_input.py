@@ -1,5 +1,7 @@
 """Bad input to the command line: one line that names what is allowed, and exit status 2."""
 
+import shutil
+
 import jax
 import pytest
 from commands import ROOT, eval_script, one_line_error, train_script
@@ -34,6 +36,10 @@ def test_resume_refuses_settings_that_would_change_the_run(trained, capsys):
         (["--seed", "-1"], "seed is -1"),
         (["--seed", "4294967296"], "seed"),
         (["--num-envs", "4"], "num_envs is 4; it must be at least 5"),
+        (["--num-envs", "4194304"], "it must be at most 134217728"),
+        (["--total-steps", "9999999999999"], "fewer than 2^31"),
+        (["--hidden-sizes", "8,8,8,8,8,8,8,8,8"], "8 of them at most"),
+        (["--save-every", "-1"], "save-every is -1"),
         (["--device", "tpu"], "cpu"),
         (["--resume", "--overwrite"], "not allowed with"),
         (["--unknown"], "--unknown"),
@@ -58,6 +64,14 @@ def test_bad_training_arguments(arguments, named, capsys):
 )
 def test_bad_evaluation_arguments(arguments, named, capsys):
     assert named in one_line_error(eval_script.main, arguments, capsys)
+
+
+def test_a_metrics_file_that_cannot_be_drawn_is_refused_before_the_work(trained, tmp_path, capsys):
+    folder = tmp_path / "run"
+    shutil.copytree(trained[0], folder)
+    (folder / "metrics.csv").write_text("agent_steps\nmany\n")
+    flags = ["--device", "cpu", "--checkpoint", str(folder), "--plot", str(tmp_path / "figures")]
+    assert "metrics.csv cannot be read" in one_line_error(eval_script.main, flags, capsys)
 
 
 def test_runs_and_folders_that_cannot_be_used(trained, tmp_path, capsys):

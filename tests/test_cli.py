@@ -164,6 +164,15 @@ def test_a_larger_total_anneals_on_and_says_so(trained, tmp_path, capsys):
     assert checkpoint.latest(folder) == 120
 
 
+def test_too_little_memory_is_one_line(tmp_path, monkeypatch, capsys):
+    def too_much(*_):
+        raise RuntimeError("RESOURCE_EXHAUSTED: Out of memory allocating 1099511627776 bytes.")
+
+    monkeypatch.setattr(learner, "init", too_much)
+    arguments = [*TINY, "--checkpoint", str(tmp_path / "run")]
+    assert "fewer --num-envs" in one_line_error(train_script.main, arguments, capsys)
+
+
 def test_a_second_run_in_a_folder_in_use_is_refused(trained, tmp_path, capsys):
     folder = tmp_path / "ckpt"
     shutil.copytree(trained[0], folder)

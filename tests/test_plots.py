@@ -24,9 +24,9 @@ def flight():
 
 
 def test_every_figure_is_written(flight, tmp_path):
-    metrics = tmp_path / "metrics.csv"
-    header = "agent_steps,episode_return,success_rate,terminal_error_deg"
-    metrics.write_text(f"{header}\n1000,,,\n2000,100,0.1,20\n3000,900,0.5,1\n")
+    names = ("agent_steps", "episode_return", "success_rate", "terminal_error_deg")
+    rows = [("1000", "", "", ""), ("2000", "100", "0.1", "20"), ("3000", "900", "0.5", "1")]
+    metrics = [dict(zip(names, row)) for row in rows]
     folder = tmp_path / "figures"
     written = plots.write_all(flight, folder, metrics)
     names = {path.stem for path in written}
