@@ -122,4 +122,6 @@ def _check_shape(name, shape, allowed):
 
 
 def _shown(values):
+    if values.ndim == 0:
+        return f"{values:.6g}"
     return " ".join(np.array2string(values, precision=6, threshold=12).split())

@@ -5,4 +5,5 @@ import kills
 
 def test_a_run_that_is_killed_ends_as_one_that_is_not(capsys):
     assert kills.main(["--kills", "4", "--seed", "1"]) == 0
-    assert "4 of 4 kills resumed, no checkpoint lost; 1 of 1 ends the same" in capsys.readouterr().out
+    output = capsys.readouterr().out
+    assert "4 of 4 kills resumed, no checkpoint lost; 1 of 1 ends the same" in output

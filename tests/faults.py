@@ -1,0 +1,151 @@
+"""Breaks the code on purpose, a fault at a time in a copy, and tells which test catches it.
+
+A fault that no test catches is an error.
+
+Example:
+    python tests/faults.py
+    python tests/faults.py --only "key reused"
+"""
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PHYSICS = ["test_truth.py", "test_dynamics.py", "test_quaternion.py", "test_env.py"]
+LEARNING = ["test_ppo.py", "test_rollout.py", "test_losses.py", "test_vector.py"]
+RUNS = ["test_checkpoint.py", "test_run_folder.py", "test_progress.py", "test_cli.py"]
+FAULTS = {
+    "sign of the gyroscopic term": (
+        "dynamics.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
+        "((i3 - i2) / i1, (i1 - i3) / i2, (i2 - i1) / i3)", PHYSICS,
+    ),
+    "gyroscopic term of a full tensor without its symmetric part": (
+        "dynamics.py", "factors = factors + factors.swapaxes(1, 2)", "factors = 2 * factors",
+        PHYSICS,
+    ),
+    "missing ½ in the kinematics": (
+        "quaternion.py", "0.5 * (w3 * q2 - w2 * q3 + w1 * qs)", "(w3 * q2 - w2 * q3 + w1 * qs)",
+        PHYSICS,
+    ),
+    "wrong order in RK4": (
+        "dynamics.py", "k3 = rate(advance(dt / 2, k2))", "k3 = rate(advance(dt / 2, k1))", PHYSICS,
+    ),
+    "skipped normalisation": (
+        "dynamics.py", "return quaternions.normalize(jnp.stack(state[:4]))",
+        "return (jnp.stack(state[:4]))", PHYSICS,
+    ),
+    "one coasting step too many": (
+        "dynamics.py", "indices = jnp.arange(frameskip,", "indices = jnp.arange(frameskip + 1,",
+        PHYSICS,
+    ),
+    "torque twice as strong": (
+        "dynamics.py", "change = call(_torque_step, *start, *acceleration, *gyroscopic)",
+        "change = call(_torque_step, *start, *(2 * a for a in acceleration), *gyroscopic)", PHYSICS,
+    ),
+    "terminal reward added, not replacing": (
+        "reward.py", "jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
+        "reward + jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
+        ["test_reward.py", "test_env.py"],
+    ),
+    "time limit before overspeed": (
+        "env.py", "truncated = ~terminated & (next_state.time", "truncated = (next_state.time",
+        ["test_env.py"],
+    ),
+    "GAE bootstraps over a termination": (
+        "losses.py", "jnp.where(terminated, 0.0, next_values)", "next_values", LEARNING,
+    ),
+    "GAE runs over the end of an episode": (
+        "losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)", LEARNING,
+    ),
+    "clipped objective without the pessimistic bound": (
+        "losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", LEARNING,
+    ),
+    "annealing off by one": (
+        "learner.py", "gradient_steps = settings.num_updates * settings.passes",
+        "gradient_steps = (settings.num_updates - 1) * settings.passes", LEARNING,
+    ),
+    "key reused from update to update": (
+        "rollout.py", "return learner.replace(key=key), steps", "return learner, steps", LEARNING,
+    ),
+    "same key for all steps of a rollout": (
+        "rollout.py", "random = (uniform, jax.random.split(flight_key, (length, 2)))",
+        "random = (0 * uniform + uniform[0], jax.random.split(flight_key, (length, 2)))", LEARNING,
+    ),
+    "reset state cached": (
+        "env.py", "fresh_observation, fresh_state = self.reset_env(key, params)",
+        "fresh_observation, fresh_state = self.reset_env(jax.random.key(0), params)",
+        ["test_env.py"],
+    ),
+    "reset state cached in the fused rollout": (
+        "vector.py", "fresh = jax.vmap(reset)(jax.random.split(fresh_key, portion), rows)",
+        "fresh = jax.vmap(reset)(jax.random.split(jax.random.key(0), portion), rows)", LEARNING,
+    ),
+    "devices draw the same numbers": (
+        "rollout.py", "jax.random.fold_in(device_key, jax.lax.axis_index(vector.AXIS))",
+        "jax.random.fold_in(device_key, 0)", LEARNING,
+    ),
+    "optimizer not restored": (
+        "checkpoint.py", "    return restored.replace(key=",
+        "    return restored.replace(optimizer=template.optimizer, key=", RUNS,
+    ),
+    "rows after the checkpoint kept": (
+        "progress.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
+    ),
+    "no lock on the folder": (
+        "run_folder.py", "fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,
+    ),
+}  # fmt: skip
+"""By name: module, code, what it becomes, tests that should catch it."""
+
+
+def main(argv=None) -> int:
+    """Try the faults; returns 1 if one was not caught."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", action="append", choices=FAULTS, help="this one (repeatable)")
+    parser.add_argument("--jobs", default="2", help="test processes")
+    arguments = parser.parse_args(argv)
+    missed = 0
+    for name in arguments.only or FAULTS:
+        caught = caught_by(*FAULTS[name], arguments.jobs)
+        missed += not caught
+        print(f"| {name} | {', '.join(caught[:3]) or 'NO TEST'} | {len(caught)} |", flush=True)
+    return 1 if missed else 0
+
+
+def caught_by(module, code, broken, tests, jobs) -> list[str]:
+    """Names of the tests that fail when the code is broken."""
+    with tempfile.TemporaryDirectory() as scratch:
+        copy = Path(scratch) / "copy"
+        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", ".venv", "ckpt", "docs"))
+        path = copy / "attjax" / module
+        text = path.read_text()
+        assert text.count(code) == 1, f"{code!r} is {text.count(code)} times in {module}"
+        path.write_text(text.replace(code, broken))
+        done = subprocess.run(
+            [
+                sys.executable,
+                "-m",
+                "pytest",
+                "-q",
+                "-n",
+                jobs,
+                *(f"tests/{test}" for test in tests),
+            ],
+            cwd=copy,
+            env=os.environ | {"PYTHONPATH": str(copy)},
+            capture_output=True,
+            text=True,
+        )
+    assert done.returncode in (0, 1), done.stdout + done.stderr
+    failed = re.findall(r"^(?:FAILED|ERROR) tests/\w+\.py::(\w+)", done.stdout, re.MULTILINE)
+    return list(dict.fromkeys(failed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,104 @@
+"""Arrays that users hand in: one line that names the array and what is allowed."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from attjax import AttitudeEnv, EnvState, dynamics, step
+
+ENV = AttitudeEnv(frameskip=5)
+PARAMS = ENV.default_params
+GOAL = EnvState(jnp.array([0.0, 0, 0, 1]), jnp.zeros(3), 0)
+
+
+def message(function, *arguments):
+    with pytest.raises(ValueError) as error:
+        function(*arguments)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    "field, value, expected",
+    [
+        ("quaternion", jnp.array([0.0, 0, 0, 2]), "quaternion has length 2; it must be 1"),
+        (
+            "quaternion",
+            jnp.array([0.0, 0, 0, np.nan]),
+            "nan]; it must be finite",
+        ),
+        ("quaternion", jnp.array([0.0, 0, 1]), "quaternion has shape (3,); it must be (4,)"),
+        (
+            "quaternion",
+            jnp.array([0, 0, 0, 1]),
+            "has type int32; it must be floating-point",
+        ),
+        ("quaternion", "north", "quaternion is str; it must be an array of numbers"),
+        ("angular_velocity", jnp.array([0.0, np.inf, 0]), "angular_velocity is [ 0. inf 0.]"),
+        ("angular_velocity", jnp.zeros(2), "angular_velocity has shape (2,); it must be (3,)"),
+    ],
+)
+def test_states(field, value, expected):
+    state = GOAL.replace(**{field: value})
+    assert expected in message(step, state, 0)
+    assert expected in message(ENV.step, jax.random.key(0), state, 0, PARAMS)
+
+
+@pytest.mark.parametrize(
+    "action, expected",
+    [
+        (19, "action is 19; it must be from 0 to 18"),
+        (-1, "action is -1; it must be from 0 to 18"),
+        (1.5, "action has type float32; it must be an integer"),
+        ([1, 2], "action has shape (2,); it must be ()"),
+        (None, "action"),
+    ],
+)
+def test_actions(action, expected):
+    assert expected in message(step, GOAL, action)
+    assert expected in message(ENV.step_env, jax.random.key(0), GOAL, action, PARAMS)
+
+
+@pytest.mark.parametrize(
+    "field, value, expected",
+    [
+        ("inertia", [1.0, 0, 1], "principal moments [0. 1. 1.]; they must be positive"),
+        ("inertia", [1.0, -1, 1], "they must be positive"),
+        ("inertia", [1.0, 1, 2.1], "none may be larger than the other two together"),
+        ("inertia", np.eye(3) + np.eye(3, k=1) / 9, "it must be symmetric"),
+        ("inertia", np.diag([1.0, 1, 3]), "none may be larger"),
+        ("inertia", [1.0, np.nan, 1], "it must be finite"),
+        ("inertia", np.ones((3, 2)), "inertia has shape (3, 2); it must be (3,) or (3, 3)"),
+        ("rate_limit", 0.0, "rate_limit is 0; it must be above 0"),
+        ("goal_angle", -1.0, "goal_angle is -1; it must be above 0"),
+        ("max_slew_angle", 0.1, "max_slew_angle is 0.1; it must be at least 0.5235"),
+        ("max_steps_in_episode", np.int32(0), "max_steps_in_episode is 0; it must be from 1"),
+        ("max_steps_in_episode", 5.0, "max_steps_in_episode has type float32"),
+        ("torque_table", np.zeros((19, 2)), "torque_table has shape (19, 2); it must be (n, 3)"),
+        ("frameskip", np.int32(6), "params.frameskip is 6; it must be from 0 to 5"),
+    ],
+)
+def test_parameters(field, value, expected):
+    value = value if isinstance(value, np.integer) else np.asarray(value, np.float32)
+    params = PARAMS.replace(**{field: value})
+    assert expected in message(ENV.reset, jax.random.key(0), params)
+    assert expected in message(ENV.step, jax.random.key(0), GOAL, 0, params)
+    assert expected in message(step, GOAL, 0, params, 5)
+
+
+def test_bodies_at_the_edge_of_what_is_possible_are_accepted():
+    """A flat plate's largest moment is the sum of the others, whatever the rounding."""
+    for moments in ([0.1, 0.2, 0.3], [0.872, 0.115, 0.987], [1.0, 1.0, 1.0]):
+        inertia = jnp.array(moments, jnp.float32)
+        dynamics.rk4_step(GOAL.quaternion, GOAL.angular_velocity, jnp.zeros(3), inertia)
+
+
+def test_inside_jit_and_vmap_shapes_and_types_are_checked():
+    states = jax.tree.map(lambda x: jnp.stack([jnp.asarray(x)] * 2), GOAL)
+    wrong = states.replace(angular_velocity=jnp.zeros((2, 2)))
+    assert "angular_velocity has shape (2,)" in message(
+        jax.jit(jax.vmap(step)), wrong, np.ones(2, int)
+    )
+    flown = jax.jit(jax.vmap(step))(states, np.array([18, 99]))
+    np.testing.assert_array_equal(flown.angular_velocity[0], flown.angular_velocity[1])
