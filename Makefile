@@ -7,7 +7,7 @@ EXTRAS ?= test
 CHECKPOINT ?= ckpt
 BIN := $(VENV)/bin
 
-.PHONY: train test eval lint setup
+.PHONY: train test test-all eval lint setup
 
 train: setup
 	$(BIN)/python train.py --num-envs 2048 --checkpoint $(CHECKPOINT) $(ARGS)
@@ -17,6 +17,16 @@ eval: setup
 
 test: setup
 	$(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
+
+# The suite on every supported Python that is here, each with the newest JAX it can have.
+test-all:
+	for version in 3.11 3.12 3.13; do \
+	    if python$$version -c '' 2>/dev/null; then \
+	        $(MAKE) test PYTHON=python$$version VENV=$(VENV)-$$version || exit 1; \
+	    else \
+	        echo "python$$version is not here: skipped"; \
+	    fi; \
+	done
 
 lint: setup
 	$(BIN)/ruff check .

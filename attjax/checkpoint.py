@@ -47,7 +47,9 @@ class Saver:
         for leftover in self._folder.glob("[0-9]*.orbax-checkpoint-tmp*"):
             shutil.rmtree(leftover, ignore_errors=True)
         newest = checkpoint_managers.LatestN(NEWEST_KEPT)
-        best = checkpoint_managers.BestN(get_metric_fn=_error, reverse=True, n=1)
+        best = checkpoint_managers.BestN(
+            get_metric_fn=_error, reverse=True, n=1, keep_checkpoints_without_metrics=False
+        )
         self._manager = ocp.CheckpointManager(
             self._folder.absolute(),
             options=ocp.CheckpointManagerOptions(
@@ -105,7 +107,9 @@ def best(folder: Path) -> int | None:
     for update in _saved(folder):
         path = Path(folder) / str(update) / "metrics" / "metrics"
         try:
-            errors[update] = _error(json.loads(path.read_text()))
+            errors[update] = float(_error(json.loads(path.read_text())))
+        except FileNotFoundError:  # of a version that did not write it
+            errors[update] = float("inf")
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise FolderError(f"{path} cannot be read: {error!r}") from None
     return min(errors, key=errors.get, default=None)

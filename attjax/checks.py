@@ -90,7 +90,8 @@ def inertia(x):
     x = real("inertia", x, (3,), (3, 3))
     if has_value(x):
         values = np.asarray(x, float)
-        if values.ndim == 2 and not np.allclose(values, values.T, rtol=1e-5, atol=0):
+        rounding = 1e-5 * np.max(np.abs(values))
+        if values.ndim == 2 and not np.allclose(values, values.T, rtol=0, atol=rounding):
             raise ValueError(f"inertia is {_shown(values)}; it must be symmetric")
         moments = np.sort(values if values.ndim == 1 else np.linalg.eigvalsh(values))
         if moments[0] <= 0:

@@ -7,7 +7,7 @@ action whose impulse comes nearest to the one that leads there.
 import chex
 import jax.numpy as jnp
 
-from attjax import dynamics, rigid_body
+from attjax import checks, dynamics, rigid_body
 from attjax import observation as observations
 from attjax import quaternion as quaternions
 from attjax.context import Context
@@ -40,6 +40,7 @@ def phase_plane(observation: chex.Array, context: Context) -> chex.Array:
     Returns:
         The action, an integer scalar.
     """
+    observation = checks.real("observation", observation, (observations.SIZE,))
     angle = quaternions.rotation_vector(observation[observations.QUATERNION])
     momentum = jnp.sum(jnp.abs(rigid_body.angular_momentum(context.inertia, angle)))
     braking = jnp.sqrt(2 * BRAKING_MARGIN * average_torque(context) / jnp.maximum(momentum, 1e-12))
@@ -54,6 +55,7 @@ def quaternion_feedback(observation: chex.Array, context: Context) -> chex.Array
     period; the proportional gain is 2 λ/Δt with the bandwidth λ a fixed multiple of
     √(U / (π I_max)), the braking rate of a half turn about the largest inertia.
     """
+    observation = checks.real("observation", observation, (observations.SIZE,))
     quaternion = observation[observations.QUATERNION]
     sign = jnp.where(quaternion[3] < 0, -1.0, 1.0).astype(quaternion.dtype)
     largest = jnp.max(context.inertia)

@@ -70,7 +70,13 @@ def random_slews(env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, episode
 def fly(
     controller: Controller, env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, episodes: int
 ) -> Episodes:
-    """Fly ``episodes`` random slews of ``params.max_steps_in_episode`` steps each."""
+    """Fly ``episodes`` random slews of ``params.max_steps_in_episode`` steps each.
+
+    Raises:
+        ValueError: there are none.
+    """
+    if episodes < 1:
+        raise ValueError(f"episodes is {episodes}; it must be at least 1")
     observation, state = random_slews(env, params, key, episodes)
     context = env.context(params)
 

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import dynamics, rigid_body
+from attjax import checks, dynamics, rigid_body
 from attjax import observation as observations
 from attjax.context import Context
 
@@ -150,6 +150,7 @@ def multiscale_features(observation: chex.Array, control_period: chex.Array) -> 
     Returns:
         (57,) features.
     """
+    observation = checks.real("observation", observation, (observations.SIZE,))
     quaternion = observation[observations.QUATERNION]
     attitude = quaternion[:3] * (FEATURE_PERIOD / control_period)
     scaled = jnp.concatenate([attitude, observation[observations.ANGULAR_VELOCITY]])

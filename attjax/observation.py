@@ -3,6 +3,7 @@
 import chex
 import jax.numpy as jnp
 
+from attjax import checks
 from attjax import quaternion as quaternions
 
 SIZE = 11
@@ -24,5 +25,7 @@ def observe(quaternion: chex.Array, angular_velocity: chex.Array) -> chex.Array:
         >>> observe(jnp.array([0.0, 0.0, 0.0, 1.0]), jnp.array([0.5, 0.0, 0.0]))[4].item()
         0.25
     """
+    quaternion = checks.real("quaternion", quaternion, (4,))
+    angular_velocity = checks.real("angular_velocity", angular_velocity, (3,))
     rate = jnp.stack(quaternions.derivative(quaternion, angular_velocity))
     return jnp.concatenate([quaternion, rate, angular_velocity])

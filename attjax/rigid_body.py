@@ -2,6 +2,8 @@
 
 import jax.numpy as jnp
 
+from attjax import checks
+
 
 def inverse(inertia):
     """Inverse of a symmetric 3x3 matrix, by the cross products of its rows."""
@@ -19,6 +21,7 @@ def angular_momentum(inertia, angular_velocity):
 
 def principal_moments(inertia):
     """(3,) principal moments, kg m², of an inertia (3,) or (3, 3)."""
+    inertia = checks.inertia(inertia)
     return inertia if inertia.ndim == 1 else jnp.linalg.eigvalsh(inertia)
 
 

@@ -117,7 +117,12 @@ def open_loop(env, params, key: chex.PRNGKey, states, actions, num_devices: int 
 
     Returns:
         The states, the observations (batch, size) after the last step, and the totals.
+
+    Raises:
+        ValueError: the actions are no such integers, the states are of another batch, or the
+            devices are too many or do not share it evenly.
     """
+    _check_batch(states, actions, num_devices)
     shared, split = PartitionSpec(), PartitionSpec(AXIS)
     return jax.shard_map(
         functools.partial(_fly_in_blocks, env),
@@ -126,6 +131,23 @@ def open_loop(env, params, key: chex.PRNGKey, states, actions, num_devices: int 
         out_specs=split,
         check_vma=False,
     )(params, jax.random.split(key, num_devices), states, actions)
+
+
+def _check_batch(states, actions, num_devices):
+    if actions.ndim != 2 or not jnp.issubdtype(actions.dtype, jnp.integer):
+        raise ValueError(
+            f"actions has shape {actions.shape} and type {actions.dtype}; "
+            f"it must be (steps, batch) integers"
+        )
+    batch = actions.shape[1]
+    sizes = {x.shape[:1] for x in jax.tree.leaves(states)}
+    if sizes != {(batch,)}:
+        raise ValueError(f"states has leading axes {sorted(sizes)}; they must be ({batch},)")
+    if not 1 <= num_devices <= len(jax.devices()) or batch % num_devices:
+        raise ValueError(
+            f"num_devices is {num_devices}; it must be a divisor of the batch, {batch}, and at "
+            f"most {len(jax.devices())}, the devices of JAX"
+        )
 
 
 def _fly_in_blocks(env, params, keys, states, actions):

@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, EnvState, dynamics, step
+from attjax import AttitudeEnv, EnvState, controllers, dynamics, step, vector
+from attjax.networks import Policy
 
 ENV = AttitudeEnv(frameskip=5)
 PARAMS = ENV.default_params
@@ -85,6 +86,29 @@ def test_parameters(field, value, expected):
     assert expected in message(ENV.reset, jax.random.key(0), params)
     assert expected in message(ENV.step, jax.random.key(0), GOAL, 0, params)
     assert expected in message(step, GOAL, 0, params, 5)
+
+
+def test_observations_of_controllers_and_policies():
+    context, short = ENV.context(PARAMS), jnp.zeros(7)
+    policy = Policy("multiscale", (8,))
+    params = policy.init(jax.random.key(0), jax.random.key(1), jnp.zeros(11), context)
+    expected = "observation has shape (7,); it must be (11,)"
+    assert expected in message(policy.act, params, short, context)
+    for controller in controllers.CONTROLLERS.values():
+        assert expected in message(controller, short, context)
+
+
+def test_batches_of_the_fused_rollout():
+    _, states = jax.vmap(ENV.reset)(jax.random.split(jax.random.key(0), 4))
+    for actions, devices, expected in (
+        (np.zeros(4, int), 1, "actions has shape (4,)"),
+        (np.zeros((3, 4)), 1, "it must be (steps, batch) integers"),
+        (np.zeros((3, 5), int), 1, "states has leading axes [(4,)]; they must be (5,)"),
+        (np.zeros((3, 4), int), 3, "num_devices is 3; it must be a divisor"),
+        (np.zeros((3, 4), int), 0, "num_devices is 0"),
+    ):
+        arguments = ENV, PARAMS, jax.random.key(1), states, actions, devices
+        assert expected in message(vector.open_loop, *arguments)
 
 
 def test_bodies_at_the_edge_of_what_is_possible_are_accepted():

@@ -173,6 +173,28 @@ def test_too_little_memory_is_one_line(tmp_path, monkeypatch, capsys):
     assert "fewer --num-envs" in one_line_error(train_script.main, arguments, capsys)
 
 
+def test_a_full_disk_ends_in_one_line_with_the_older_checkpoint_intact(trained, tmp_path):
+    """No file may grow beyond what is too little for a checkpoint, as on a disk that is full."""
+    folder = tmp_path / "ckpt"
+    shutil.copytree(trained[0], folder)
+    before = {p: p.read_bytes() for p in (folder / "60").rglob("*") if p.is_file()}
+    code = f"""
+import resource, sys
+sys.path.insert(0, {str(ROOT)!r})
+import train
+resource.setrlimit(resource.RLIMIT_FSIZE, (8000, 8000))
+sys.exit(train.main(sys.argv[1:]))
+"""
+    flags = ["--resume", "--device=cpu", "--checkpoint", str(folder), "--total-steps=16000"]
+    command = [sys.executable, "-W", "ignore", "-c", code, *flags]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.count("\n") == 1 and "cannot be written: " in done.stderr, done.stderr
+    assert before == {p: p.read_bytes() for p in (folder / "60").rglob("*") if p.is_file()}
+    assert checkpoint.latest(folder) == 60
+    assert run("train.py", *flags).returncode == 0
+
+
 def test_a_second_run_in_a_folder_in_use_is_refused(trained, tmp_path, capsys):
     folder = tmp_path / "ckpt"
     shutil.copytree(trained[0], folder)

@@ -6,8 +6,8 @@ from pathlib import Path
 import attjax
 
 LAYERS = [
-    {"settings", "checks", "context", "spaces", "rigid_body", "kernel", "vector"},
-    {"quaternion"},
+    {"settings", "checks", "context", "spaces", "kernel", "vector"},
+    {"quaternion", "rigid_body"},
     {"dynamics"},
     {"spacecraft", "reward", "observation"},
     {"env"},
