@@ -1,6 +1,9 @@
 import jax
 import pytest
 from commands import STEPS_PER_UPDATE, TINY, run
+from fuzzing import Accepted
+
+from attjax import evaluation, training
 
 jax.config.update("jax_num_cpu_devices", 2)  # what is shared out over devices is tested on two
 jax.config.update("jax_legacy_prng_key", "error")  # typed keys throughout
@@ -27,3 +30,15 @@ def trained(tmp_path_factory):
     result = run("train.py", *TINY, "--total-steps", 60 * STEPS_PER_UPDATE, "--checkpoint", folder)
     assert result.returncode == 0, result.stderr
     return folder, result.stdout
+
+
+@pytest.fixture
+def no_work(monkeypatch):
+    """Input that is accepted raises Accepted, where the work would begin."""
+
+    def accept(*_, **__):
+        raise Accepted
+
+    monkeypatch.setattr(evaluation, "fly", accept)
+    monkeypatch.setattr(training.Run, "train", accept)
+    monkeypatch.setattr(training.Run, "describe", lambda *_: None)

@@ -1,6 +1,6 @@
 """Flies the LM50 bus in Basilisk and prints what test_truth.py compares attjax with.
 
-Needs `pip install bsk` (2.12.1 wrote the file that is kept):
+Needs the extra basilisk (bsk 2.12.1 wrote the file that is kept):
 
     PYTHONPATH=tests python tests/data/basilisk_slew.py > tests/data/basilisk_slew.csv
 
