@@ -6,6 +6,7 @@ all that training needs to go on. Orbax writes them beside and renames them when
 
 import functools
 import json
+import logging
 import re
 import shutil
 import sys
@@ -26,6 +27,9 @@ BEST_BY = "terminal_error_deg"
 def _error(metrics):
     return metrics[BEST_BY]
 
+
+for name in ("absl", "asyncio"):  # where Orbax logs at length what it also raises
+    logging.getLogger(name).setLevel(logging.CRITICAL)
 
 _unraisable = sys.unraisablehook
 
@@ -167,7 +171,9 @@ def _restore(folder, update, item, template):
 
 
 def _first_sentence(error):
-    return re.split(r"\n|\. ", str(error).strip())[0][:200] or type(error).__name__
+    """What went wrong, in a line; of a long one the beginning and the end, where the cause is."""
+    sentence = re.split(r"\n|\. ", str(error).strip())[0] or type(error).__name__
+    return sentence if len(sentence) <= 200 else f"{sentence[:90]} … {sentence[-110:]}"
 
 
 def _storable(learner):
