@@ -35,7 +35,7 @@ _unraisable = sys.unraisablehook
 
 
 def _hook(unraisable):
-    """Print no traceback of reads that Orbax leaves be where another array cannot be read."""
+    """Print no traceback of what Orbax leaves be where another array's file fails."""
     if str(unraisable.exc_value) != "Event loop is closed":
         _unraisable(unraisable)
 
@@ -47,6 +47,7 @@ class Saver:
     """
 
     def __init__(self, folder: Path):
+        sys.unraisablehook = _hook
         self._folder = Path(folder)
         for leftover in self._folder.glob("[0-9]*.orbax-checkpoint-tmp*"):
             shutil.rmtree(leftover, ignore_errors=True)

@@ -51,7 +51,7 @@ def enough_memory(advice: str):
     """Turn JAX's errors about memory into a :class:`UserError` with this advice."""
     try:
         yield
-    except Exception as error:
+    except RuntimeError as error:
         if "RESOURCE_EXHAUSTED" not in str(error):
             raise
         raise UserError(f"the memory does not suffice; {advice}") from None

@@ -1,4 +1,4 @@
-"""Breaks the code on purpose, a fault at a time in a copy, and tells which test catches it.
+"""Breaks the code on purpose, a fault at a time in a copy, and tells which test catches it first.
 
 A fault that no test catches is an error.
 
@@ -58,13 +58,13 @@ FAULTS = {
         ["test_env.py"],
     ),
     "GAE bootstraps over a termination": (
-        "losses.py", "jnp.where(terminated, 0.0, next_values)", "next_values", LEARNING,
+        "losses.py", "jnp.where(terminated, 0.0, next_values)", "next_values", ["test_losses.py"],
     ),
     "GAE runs over the end of an episode": (
-        "losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)", LEARNING,
+        "losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)", ["test_losses.py"],
     ),
     "clipped objective without the pessimistic bound": (
-        "losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", LEARNING,
+        "losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", ["test_losses.py"],
     ),
     "annealing off by one": (
         "learner.py", "gradient_steps = settings.num_updates * settings.passes",
@@ -114,12 +114,12 @@ def main(argv=None) -> int:
     for name in arguments.only or FAULTS:
         caught = caught_by(*FAULTS[name], arguments.jobs)
         missed += not caught
-        print(f"| {name} | {', '.join(caught[:3]) or 'NO TEST'} | {len(caught)} |", flush=True)
+        print(f"| {name} | {', '.join(caught) or 'NO TEST'} |", flush=True)
     return 1 if missed else 0
 
 
 def caught_by(module, code, broken, tests, jobs) -> list[str]:
-    """Names of the tests that fail when the code is broken."""
+    """Names of the first tests to fail when the code is broken."""
     with tempfile.TemporaryDirectory() as scratch:
         copy = Path(scratch) / "copy"
         shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", ".venv", "ckpt", "docs"))
@@ -142,7 +142,7 @@ def caught_by(module, code, broken, tests, jobs) -> list[str]:
             capture_output=True,
             text=True,
         )
-    assert done.returncode in (0, 1), done.stdout + done.stderr
+    assert done.returncode in (0, 1, 2), done.stdout + done.stderr
     failed = re.findall(r"^(?:FAILED|ERROR) tests/\w+\.py::(\w+)", done.stdout, re.MULTILINE)
     return list(dict.fromkeys(failed))
 

@@ -195,6 +195,19 @@ sys.exit(train.main(sys.argv[1:]))
     assert run("train.py", *flags).returncode == 0
 
 
+def test_a_disk_that_is_full_is_not_taken_for_too_little_memory(tmp_path, monkeypatch, capsys):
+    def full(*_, **__):
+        raise ValueError("RESOURCE_EXHAUSTED: Failed to write: No space left on device")
+
+    monkeypatch.setattr(checkpoint.ocp.CheckpointManager, "save", full)
+    arguments = [*TINY, "--total-steps", "1", "--checkpoint", str(tmp_path / "run")]
+    with pytest.raises(SystemExit) as exit_:
+        train_script.main(arguments)
+    error = capsys.readouterr().err
+    assert exit_.value.code == 2 and error.count("\n") == 1
+    assert "1 cannot be written" in error and "No space left" in error and "memory" not in error
+
+
 def test_a_second_run_in_a_folder_in_use_is_refused(trained, tmp_path, capsys):
     folder = tmp_path / "ckpt"
     shutil.copytree(trained[0], folder)
