@@ -61,7 +61,8 @@ FAULTS = {
         "losses.py", "jnp.where(terminated, 0.0, next_values)", "next_values", ["test_losses.py"],
     ),
     "GAE runs over the end of an episode": (
-        "losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)", ["test_losses.py"],
+        "losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)",
+        ["test_losses.py"],
     ),
     "clipped objective without the pessimistic bound": (
         "losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", ["test_losses.py"],
