@@ -106,9 +106,14 @@ def create(folder: Path, config: Config, overwrite: bool) -> None:
 
 
 def write_config(folder: Path, config: Config) -> None:
-    """Write config.json."""
+    """Write config.json.
+
+    Raises:
+        FolderError: it cannot be written.
+    """
     content = {"program": "attjax", "format": FORMAT, **dataclasses.asdict(config)}
-    replace(folder / CONFIG, json.dumps(content, indent=2) + "\n")
+    with writing(folder):
+        replace(folder / CONFIG, json.dumps(content, indent=2) + "\n")
 
 
 def replace(path: Path, text: str) -> None:

@@ -17,6 +17,18 @@ def test_config_round_trip(tmp_path):
     assert run_folder.read_config(tmp_path) == CONFIG
 
 
+def test_a_configuration_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
+    run_folder.create(tmp_path, CONFIG, overwrite=False)
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(run_folder.Path, "write_text", full)
+    with pytest.raises(FolderError, match="No space left on device"):
+        run_folder.write_config(tmp_path, run_folder.Config("paper", 1, CONFIG.settings))
+    assert run_folder.read_config(tmp_path) == CONFIG
+
+
 def test_a_run_is_not_overwritten_unless_asked(tmp_path):
     run_folder.create(tmp_path, CONFIG, overwrite=False)
     (tmp_path / "3").mkdir()
