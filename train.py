@@ -7,8 +7,9 @@ Example:
 
 import dataclasses
 import sys
+from pathlib import Path
 
-from attjax import cli, presets, run_folder
+from attjax import cli, config_file, presets, run_folder
 
 DEFAULT_PRESET = "precise"
 
@@ -27,6 +28,10 @@ def parse_arguments(argv):
     cli.add_number(parser, "save-every", float, 30.0, save_help, low=0)
     debug_help = "check every operation, and name the first that makes a NaN (slow)"
     parser.add_argument("--debug-nans", action="store_true", help=debug_help)
+    config_help = "TOML file with preset, seed and [settings]; flags override it"
+    parser.add_argument("--config", type=Path, metavar="FILE", help=config_help)
+    print_help = "print the file that reproduces this run, and end"
+    parser.add_argument("--print-config", action="store_true", help=print_help)
     cli.add_settings(parser)
     return parser.parse_args(argv)
 
@@ -35,19 +40,35 @@ def main(argv=None) -> int:
     """Run a training; returns the exit status."""
     arguments = parse_arguments(argv)
     with cli.one_line_errors("train.py", ValueError):
-        preset = arguments.preset or DEFAULT_PRESET
-        new = dataclasses.replace(presets.PRESETS[preset], **cli.overrides(arguments))
+        given = _given(arguments)
+        new = _new_config(**given)
+    if arguments.print_config:
+        print(config_file.text(new), end="")
+        return 0
     with cli.StopSignals() as stop, cli.one_line_errors("train.py", run_folder.FolderError):
         device = cli.select_device(arguments.device)
         advice = "fewer --num-envs or a shorter --rollout-length take less"
         with run_folder.opened(arguments.checkpoint), cli.enough_memory(advice):
-            return _train(
-                arguments, run_folder.Config(preset, arguments.seed or 0, new), stop, device
-            )
+            run = _open(arguments, given, new, stop)
+            run.describe(device)
+            return run.train(arguments.save_every, arguments.debug_nans)
 
 
-def _train(arguments, new, stop, device):
-    """Start or continue the run of the folder."""
+def _given(arguments):
+    """By name, what the command line says of the run, and the file where it says nothing."""
+    given = {} if arguments.config is None else config_file.read(arguments.config)
+    for name in ("preset", "seed"):
+        if getattr(arguments, name) is not None:
+            given[name] = getattr(arguments, name)
+    return given | cli.overrides(arguments)
+
+
+def _new_config(preset=DEFAULT_PRESET, seed=0, **settings):
+    return run_folder.Config(preset, seed, dataclasses.replace(presets.PRESETS[preset], **settings))
+
+
+def _open(arguments, given, new, stop):
+    """The folder's run, new or continued."""
     # Imported late: with it, --help and errors in the arguments would take seconds.
     from attjax import training
 
@@ -58,23 +79,18 @@ def _train(arguments, new, stop, device):
         run = training.Run(folder, new, stop)
     else:
         old = run_folder.read_config(folder)
-        longer = _resumed_config(arguments, old)
+        longer = _resumed_config(given, old)
         run = training.Run(folder, longer, stop)
         if longer != old:
             run.announce_longer(old.settings)
             run_folder.write_config(folder, longer)
-    run.describe(device)
-    return run.train(arguments.save_every, arguments.debug_nans)
+    return run
 
 
-def _resumed_config(arguments, config):
-    """The folder's run, with a larger total if one was asked for."""
-    given = cli.overrides(arguments)
-    total = given.pop("total_steps", config.settings.total_steps)
-    for name in ("preset", "seed"):
-        if getattr(arguments, name) is not None:
-            given[name] = getattr(arguments, name)
-    run = vars(config) | dataclasses.asdict(config.settings)
+def _resumed_config(given, config):
+    """What the folder's run was started with, with a larger total if one was asked for."""
+    total = given.get("total_steps", config.settings.total_steps)
+    run = vars(config) | dataclasses.asdict(config.settings) | {"total_steps": total}
     differing = [name for name, value in given.items() if run[name] != value]
     if differing:
         listed = ", ".join(f"{name} ({run[name]})" for name in differing)

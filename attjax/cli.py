@@ -96,8 +96,7 @@ def add_common(parser: argparse.ArgumentParser, seed_help: str) -> None:
 
 def add_number(parser, name: str, kind: type, default, help: str, **limits) -> None:
     """Add the flag of a number with limits, as in :func:`attjax.settings.setting`."""
-    field = settings.setting(help, **limits)
-    field.name, field.type = name, kind
+    field = settings.single(name, kind, help, **limits)
     parser.add_argument(
         "--" + name,
         type=_parser_of(field),

@@ -18,6 +18,13 @@ def setting(help: str, **limits):
     return dataclasses.field(metadata={"help": help, **limits})
 
 
+def single(name: str, kind: type, help: str, **limits) -> dataclasses.Field:
+    """A field, as of :func:`setting`, that belongs to no class: for :func:`check`."""
+    field = setting(help, **limits)
+    field.name, field.type = name, kind
+    return field
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Settings:
     """Settings of a training run; ``presets.py`` gives the values.

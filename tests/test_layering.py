@@ -18,7 +18,7 @@ LAYERS = [
     {"ppo"},
     {"presets", "assembly", "run_folder", "nan_search"},
     {"progress", "report", "cli"},
-    {"checkpoint"},
+    {"checkpoint", "config_file"},
     {"training", "plots"},
 ]
 LEARNING = {"networks", "losses", "learner", "rollout", "descent", "ppo"}
