@@ -9,7 +9,9 @@ import attjax
 from attjax import dynamics, flight_policy, networks
 from attjax.flight_policy import FlightPolicy
 
-FILES = ("attjax_policy.h", "attjax_policy.c", "attjax_vectors.h", "attjax_test.c")
+POLICY_FILES = ("attjax_policy.h", "attjax_policy.c")
+TEST_FILES = ("attjax_vectors.h", "attjax_test.c")
+FILES = POLICY_FILES + TEST_FILES
 VECTORS = 500
 VECTOR_SLEWS = 25
 NUMBERS_A_LINE = 8
@@ -17,9 +19,19 @@ NUMBERS_A_LINE = 8
 
 def files(flight: FlightPolicy, seed: int) -> dict[str, str]:
     """The text of each of FILES; ``seed`` draws the slews that the test vectors come from."""
-    values = {"version": attjax.__version__}
-    values |= _header_values(flight) | _source_values(flight) | _vector_values(flight, seed)
-    return {name: _fill(name, values) for name in FILES}
+    return policy_files(flight) | test_files(flight, seed)
+
+
+def policy_files(flight: FlightPolicy) -> dict[str, str]:
+    """The header and the source."""
+    values = _header_values(flight) | _source_values(flight)
+    return {name: _fill(name, values) for name in POLICY_FILES}
+
+
+def test_files(flight: FlightPolicy, seed: int) -> dict[str, str]:
+    """The test program, and the test vectors that it includes."""
+    values = _vector_values(flight, seed)
+    return {name: _fill(name, values) for name in TEST_FILES}
 
 
 def constant_bytes(flight: FlightPolicy) -> int:
@@ -64,7 +76,7 @@ def operations(flight: FlightPolicy) -> dict[str, int]:
 def _fill(name, values):
     """A template of this package with its $names replaced."""
     text = resources.files("attjax").joinpath("templates", name).read_text(encoding="utf-8")
-    return Template(text).substitute(values)
+    return Template(text).substitute(values, version=attjax.__version__)
 
 
 def _header_values(flight):
@@ -186,13 +198,9 @@ def _row(values, number=None):
 
 def _number(x):
     """A C constant that is exactly this float32."""
-    return _with_point(f"{np.float32(x):.9g}") + "f"
+    return str(np.float32(x) + np.float32(0)) + "f"  # + 0: no -0.0
 
 
 def _double(x):
     """A C constant that is exactly this number."""
-    return _with_point(f"{float(x):.17g}")
-
-
-def _with_point(text):
-    return text if set(text) & set(".e") else text + ".0"
+    return repr(float(x))

@@ -80,6 +80,13 @@ class FlightPolicy:
         """The spacecraft as the policy knows it, in float32."""
         return self.env.context(self.env.default_params)
 
+    def act_in_float32(self, observation, context: Context):
+        """The action for an observation (11,) of any type; the context is its own, float32."""
+        del context
+        single = observation.astype(jnp.float32)
+        state = single[observations.QUATERNION], single[observations.ANGULAR_VELOCITY]
+        return decide(self, *state)[0]
+
     @property
     def control_period(self) -> np.float32:
         """Time between two decisions, s."""
@@ -157,16 +164,20 @@ def decisions(flight: FlightPolicy, quaternion, angular_velocity) -> Decisions:
     quaternion, angular_velocity = (
         np.asarray(x, np.float32) for x in (quaternion, angular_velocity)
     )
-    act = jax.jit(jax.vmap(functools.partial(decide, flight)))
-    action, logits = map(np.asarray, act(quaternion, angular_velocity))
+    action, logits = map(np.asarray, _decide_all(flight, quaternion, angular_velocity))
     nearby = [
-        np.asarray(act(quaternion, angular_velocity * np.float32(1 + change))[1])
+        np.asarray(_decide_all(flight, quaternion, angular_velocity * np.float32(1 + change))[1])
         for change in (-MASK_ROUNDING, MASK_ROUNDING)
     ]
     masked = logits == networks.MASKED_LOGIT
     same_mask = [np.all((x == networks.MASKED_LOGIT) == masked, axis=1) for x in nearby]
     clear = _not_tied(np.where(masked, np.nan, logits)) & same_mask[0] & same_mask[1]
     return Decisions(quaternion, angular_velocity, action, logits, clear)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _decide_all(flight, quaternion, angular_velocity):
+    return jax.vmap(functools.partial(decide, flight))(quaternion, angular_velocity)
 
 
 def _not_tied(logits):
@@ -204,7 +215,7 @@ def fly_table_5(flight: FlightPolicy) -> Flown:
     the policy is told its state in float32. That is what the C test program does, so both see
     the same states for as long as they decide alike.
     """
-    act = jax.tree_util.Partial(functools.partial(_act_in_float32, flight))
+    act = jax.tree_util.Partial(flight.act_in_float32)
     with jax.enable_x64(True):
         params = flight.env.default_params.replace(
             inertia=jnp.asarray(flight.context.inertia, float),
@@ -215,11 +226,3 @@ def fly_table_5(flight: FlightPolicy) -> Flown:
         angle = jnp.rad2deg(jax.vmap(quaternions.error_angle)(history.quaternion[-1]))
         rate = jnp.linalg.norm(history.angular_velocity[-1], axis=-1)
         return Flown(*map(np.asarray, (start.quaternion, angle, rate)))
-
-
-def _act_in_float32(flight, observation, context):
-    """Of the context only the flight policy's own, which is float32, is used."""
-    del context
-    single = observation.astype(jnp.float32)
-    state = single[observations.QUATERNION], single[observations.ANGULAR_VELOCITY]
-    return decide(flight, *state)[0]
