@@ -18,6 +18,7 @@ from orbax.checkpoint import checkpoint_managers
 
 from attjax import assembly, run_folder
 from attjax.learner import Learner
+from attjax.networks import Policy
 from attjax.run_folder import FolderError
 
 NEWEST_KEPT = 3
@@ -145,10 +146,20 @@ def restore_policy(folder: Path, update: int | None = None) -> jax.tree_util.Par
     Raises:
         FolderError: the folder holds no checkpoint, an unreadable one or one of another run.
     """
+    policy, params = restore_network(folder, update)
+    return jax.tree_util.Partial(policy.act, params)
+
+
+def restore_network(folder: Path, update: int | None = None) -> tuple[Policy, dict]:
+    """The same as the policy and its parameters {"policy": ...}, apart.
+
+    Raises:
+        FolderError: as :func:`restore_policy`.
+    """
     policy = assembly.policy(run_folder.read_config(folder).settings)
     template = jax.eval_shape(functools.partial(assembly.initial_parameters, policy))["policy"]
     params = _restore(folder, latest(folder) if update is None else update, "policy", template)
-    return jax.tree_util.Partial(policy.act, {"policy": params})
+    return policy, {"policy": params}
 
 
 def _restore(folder, update, item, template):

@@ -1,4 +1,4 @@
-"""What train.py and eval.py share: arguments, one-line errors, devices, the compile cache."""
+"""What the commands share: arguments, one-line errors, devices, the compile cache."""
 
 import argparse
 import contextlib

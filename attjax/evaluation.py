@@ -20,6 +20,13 @@ from attjax.spacecraft import EnvParams, EnvState
 Controller = Callable[[chex.Array, Context], chex.Array]
 """``act(observation (11,), context) -> action``; a pytree, e.g. ``jax.tree_util.Partial``."""
 
+TABLE_5 = {
+    "slew1": (0.44228, 0.44228, 0.44228, 0.64279),
+    "slew2": (0.44228, -0.44228, 0.44228, 0.64279),
+    "slew3": (-0.44228, -0.44228, 0.44228, 0.64279),
+}
+"""Initial error quaternions of the paper's three control examples, 100° each."""
+
 STATISTICS = ("mean", "std", "min", "q1", "q2", "q3", "max")
 
 
@@ -64,6 +71,14 @@ class History:
 def random_slews(env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, episodes: int):
     """Observations (episodes, 11) and states at the start of ``episodes`` random slews."""
     return jax.vmap(env.reset, (0, None))(jax.random.split(key, episodes), params)
+
+
+def table_5_slews() -> EnvState:
+    """States at the start of the slews of TABLE_5, as a batch of 3, at rest."""
+    quaternion = jnp.array(list(TABLE_5.values()), float)
+    quaternion /= jnp.linalg.norm(quaternion, axis=-1, keepdims=True)
+    n = len(quaternion)
+    return EnvState(quaternion, jnp.zeros((n, 3)), jnp.zeros(n, jnp.int32))
 
 
 @functools.partial(jax.jit, static_argnames=("env", "episodes"))

@@ -118,10 +118,14 @@ class Policy:
             allowed = rate_mask(observation, context, self.rate_margin)
         return Inputs(features, allowed)
 
+    def logits(self, params: dict, inputs: Inputs) -> chex.Array:
+        """(actions, samples) of (samples, ...) inputs, MASKED_LOGIT where masked."""
+        logits = self.policy_network.apply(params["policy"], inputs.features)
+        return jnp.where(inputs.allowed.T, logits, MASKED_LOGIT)
+
     def log_probabilities(self, params: dict, inputs: Inputs) -> chex.Array:
         """LogSoftmax over the actions (Table 3), (actions, samples), of (samples, ...) inputs."""
-        logits = self.policy_network.apply(params["policy"], inputs.features)
-        return nn.log_softmax(jnp.where(inputs.allowed.T, logits, MASKED_LOGIT), axis=0)
+        return nn.log_softmax(self.logits(params, inputs), axis=0)
 
     def value(self, params: dict, features: chex.Array) -> chex.Array:
         """(samples,) V(s) of (samples, features)."""

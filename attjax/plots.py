@@ -12,19 +12,12 @@ import numpy as np
 from attjax import evaluation
 from attjax import quaternion as quaternions
 from attjax.env import AttitudeEnv
-from attjax.evaluation import Controller, Episodes
+from attjax.evaluation import TABLE_5, Controller, Episodes
 from attjax.report import PAPER_TABLE_2
 from attjax.spacecraft import EnvParams, EnvState
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
-
-TABLE_5 = {
-    "slew1": (0.44228, 0.44228, 0.44228, 0.64279),
-    "slew2": (0.44228, -0.44228, 0.44228, 0.64279),
-    "slew3": (-0.44228, -0.44228, 0.44228, 0.64279),
-}
-"""Initial error quaternions of the paper's three control examples, 100° each."""
 
 PULSES = (-0.5, -0.05, -0.005, 0, 0.005, 0.05, 0.5)
 STYLES = ("-", "--", "-.", ":")
@@ -38,13 +31,6 @@ def _save(figure, folder: Path, name: str) -> Path:
     figure.savefig(path, dpi=150)
     plt.close(figure)
     return path
-
-
-def _at_rest(quaternion) -> EnvState:
-    quaternion = jnp.asarray(quaternion, float)
-    quaternion /= jnp.linalg.norm(quaternion, axis=-1, keepdims=True)
-    n = len(quaternion)
-    return EnvState(quaternion, jnp.zeros((n, 3)), jnp.zeros(n, jnp.int32))
 
 
 def _angles_deg(quaternion):
@@ -77,7 +63,7 @@ class Flight:
     @functools.cached_property
     def table_5(self):
         """Time and history of Table 5's slews, which two figures show."""
-        return self.record(_at_rest(list(TABLE_5.values())))
+        return self.record(evaluation.table_5_slews())
 
     def record(self, start: EnvState):
         """Time in s, (steps,), and the history of slews from the given states."""

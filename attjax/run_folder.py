@@ -116,10 +116,10 @@ def write_config(folder: Path, config: Config) -> None:
         replace(folder / CONFIG, json.dumps(content, indent=2) + "\n")
 
 
-def replace(path: Path, text: str) -> None:
-    """Write a file in one step: whoever reads it finds the old text or the new one."""
+def replace(path: Path, content: str | bytes) -> None:
+    """Write a file in one step: whoever reads it finds the old content or the new one."""
     temporary = path.with_name(path.name + ".tmp")
-    temporary.write_text(text)
+    temporary.write_bytes(content.encode() if isinstance(content, str) else content)
     os.replace(temporary, path)
 
 

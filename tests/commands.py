@@ -1,4 +1,4 @@
-"""Running train.py and eval.py, as processes and in this one."""
+"""Running train.py, eval.py and export.py, as processes and in this one."""
 
 import subprocess
 import sys
@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 import eval as eval_script
+import export as export_script
 import train as train_script
 
-__all__ = ["eval_script", "train_script"]
+__all__ = ["eval_script", "export_script", "train_script"]
 
 ROOT = Path(__file__).parent.parent
 TINY = [

@@ -17,9 +17,9 @@ LAYERS = [
     {"rollout", "descent"},
     {"ppo"},
     {"presets", "assembly", "run_folder", "nan_search"},
-    {"progress", "report", "cli"},
+    {"progress", "report", "cli", "flight_policy"},
     {"checkpoint", "config_file"},
-    {"training", "plots"},
+    {"training", "plots", "export_c", "export_onnx", "export_stablehlo"},
 ]
 LEARNING = {"networks", "losses", "learner", "rollout", "descent", "ppo"}
 SPACECRAFT = {"spacecraft", "reward", "env"}

@@ -9,7 +9,8 @@ import pytest
 from commands import ROOT, TINY, eval_script, train_script
 from packaging.requirements import Requirement
 
-SOURCES = [*(ROOT / "attjax").glob("*.py"), ROOT / "train.py", ROOT / "eval.py"]
+SCRIPTS = [ROOT / name for name in ("train.py", "eval.py", "export.py")]
+SOURCES = [*(ROOT / "attjax").glob("*.py"), *SCRIPTS]
 MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
 MODULES |= {"socket", "urllib", "http", "requests", "ftplib"}
 CALLS = {"eval", "exec", "compile", "__import__"}

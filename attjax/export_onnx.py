@@ -1,0 +1,155 @@
+"""A policy as an ONNX graph. Needs the extra ``onnx``.
+
+Inputs, float32: ``quaternion`` (batch, 4), unit error quaternions, scalar last, and
+``angular_velocity`` (batch, 3), body frame, rad/s. Outputs: ``action`` (batch,), int64, and
+``logits`` (batch, actions), -1e9 where masked.
+"""
+
+import numpy as np
+import onnx
+from onnx import TensorProto, helper, numpy_helper
+
+import attjax
+from attjax import networks
+from attjax.flight_policy import FlightPolicy
+
+FILES = ("attjax_policy.onnx",)
+OPSET = 17
+IR_VERSION = 8
+"""What ONNX Runtime reads since its version 1.13, of 2022."""
+
+
+class Graph:
+    """Nodes and constants, in the order in which they are added."""
+
+    def __init__(self):
+        self.nodes, self.constants = [], []
+
+    def constant(self, name: str, values) -> str:
+        """Add a constant, float32 unless it is of integers or booleans; returns its name."""
+        values = np.asarray(values)
+        values = values.astype(np.float32) if values.dtype.kind == "f" else values
+        self.constants.append(numpy_helper.from_array(values, name))
+        return name
+
+    def add(self, operator: str, inputs: list[str], output: str, **attributes) -> str:
+        """Add a node; returns the name of its output."""
+        self.nodes.append(helper.make_node(operator, inputs, [output], output, **attributes))
+        return output
+
+
+def files(flight: FlightPolicy, seed: int = 0) -> dict[str, bytes]:
+    """The content of each of FILES; there are no test vectors for a seed to draw."""
+    del seed
+    return {FILES[0]: model(flight).SerializeToString(deterministic=True)}
+
+
+def model(flight: FlightPolicy) -> onnx.ModelProto:
+    """The policy as an ONNX model, checked."""
+    graph, actions = Graph(), len(flight.torque_table)
+    logits = _network(graph, flight.layers, _features(graph, flight))
+    if flight.rate_mask is not None:
+        masked = graph.constant("masked_logit", np.float32(networks.MASKED_LOGIT))
+        logits = graph.add("Where", [_allowed(graph, flight), logits, masked], "masked_logits")
+    graph.add("Identity", [logits], "logits")
+    graph.add("ArgMax", [logits], "action", axis=1, keepdims=0)  # the first of equal ones
+    inputs = [_tensor("quaternion", 4), _tensor("angular_velocity", 3)]
+    action = helper.make_tensor_value_info("action", TensorProto.INT64, ["batch"])
+    result = helper.make_model(
+        helper.make_graph(
+            graph.nodes,
+            "attjax_policy",
+            inputs,
+            [action, _tensor("logits", actions)],
+            graph.constants,
+            doc_string=f"{flight.origin}; control period {flight.control_period:g} s",
+        ),
+        opset_imports=[helper.make_opsetid("", OPSET)],
+        ir_version=IR_VERSION,
+        producer_name="attjax",
+        producer_version=attjax.__version__,
+    )
+    onnx.checker.check_model(result, full_check=True)
+    return result
+
+
+def _tensor(name, size):
+    return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", size])
+
+
+def _features(graph, flight):
+    if flight.policy.features == "state":
+        return _state_features(graph)
+    return _multiscale_features(graph, flight.control_period)
+
+
+def _state_features(graph):
+    """Eq. 11: the quaternion's rate is a sum over the products of all qᵢ and ωⱼ."""
+    shapes = {"column": [0, 4, 1], "row": [0, 1, 3], "products": [0, 12]}
+    shapes = {k: graph.constant(f"{k}_shape", np.array(v, np.int64)) for k, v in shapes.items()}
+    column = graph.add("Reshape", ["quaternion", shapes["column"]], "column")
+    row = graph.add("Reshape", ["angular_velocity", shapes["row"]], "row")
+    outer = graph.add("Mul", [column, row], "outer")
+    products = graph.add("Reshape", [outer, shapes["products"]], "products")
+    kinematics = graph.constant("kinematics", _kinematics().reshape(12, 4))
+    rate = graph.add("MatMul", [products, kinematics], "quaternion_rate")
+    return graph.add("Concat", ["quaternion", rate, "angular_velocity"], "features", axis=1)
+
+
+def _kinematics():
+    """(4, 3, 4) factors of qᵢ ωⱼ in q̇ₖ (Eq. 9)."""
+    factors = np.zeros((4, 3, 4), np.float32)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        factors[j, k, i], factors[k, j, i] = 0.5, -0.5
+        factors[3, i, i], factors[i, i, 3] = 0.5, -0.5
+    return factors
+
+
+def _multiscale_features(graph, period):
+    """Tanh of the scaled attitude and rate; q_s and two constants of the control period."""
+    scales = np.array(networks.SCALES, np.float32)
+    attitude = np.eye(4, 3, dtype=np.float32) * (np.float32(networks.FEATURE_PERIOD) / period)
+    attitude = graph.constant("attitude_factors", attitude)
+    attitude = graph.add("MatMul", ["quaternion", attitude], "attitude")
+    state = graph.add("Concat", [attitude, "angular_velocity"], "state", axis=1)
+    factors = graph.constant("scale_factors", np.kron(scales, np.eye(6, dtype=np.float32)))
+    scaled = graph.add("Tanh", [graph.add("MatMul", [state, factors], "scaled")], "fine")
+    ten = np.float32(10) * period
+    scalar_part = np.zeros((4, 3), np.float32)
+    scalar_part[3, 0] = 1
+    scalar_part = graph.constant("scalar_part", scalar_part)
+    constants = graph.constant("period", np.array([0, ten, np.log(ten)], np.float32))
+    plain = graph.add("Gemm", ["quaternion", scalar_part, constants], "plain")
+    return graph.add("Concat", [scaled, plain], "features", axis=1)
+
+
+def _network(graph, layers, x):
+    for number, layer in enumerate(layers, 1):
+        weights = graph.constant(f"weights_{number}", layer.weights)
+        biases = graph.constant(f"biases_{number}", layer.biases)
+        x = graph.add("Gemm", [x, weights, biases], f"layer_{number}")
+        if number < len(layers):
+            x = graph.add("Relu", [x], f"hidden_{number}")
+    return x
+
+
+def _allowed(graph, flight):
+    """The actions that :class:`attjax.flight_policy.RateMask` allows, (batch, actions)."""
+    mask, rate = flight.rate_mask, "angular_velocity"
+    form = graph.constant("peak_rate_form", mask.form)
+    twice_impulse = graph.constant("twice_impulse", 2 * mask.impulse.T)
+    own_gain = graph.constant("own_gain", mask.own_gain)
+    limit = graph.constant("limit_squared", mask.limit_squared)
+    zero = graph.constant("zero", np.float32(0))
+    no_torque = graph.constant("no_torque", np.all(flight.torque_table == 0, axis=1))
+    gradient = graph.add("MatMul", [rate, form], "gradient")
+    gain = graph.add("Gemm", [gradient, twice_impulse, own_gain], "gain")
+    axis = graph.constant("axis", np.array([1], np.int64))
+    terms = graph.add("Mul", [gradient, rate], "terms")
+    peak = graph.add("ReduceSum", [terms, axis], "peak_squared", keepdims=1)
+    after = graph.add("Add", [peak, gain], "peak_squared_after")
+    within = graph.add("LessOrEqual", [after, limit], "within")
+    lower = graph.add("Less", [gain, zero], "lower")
+    allowed = graph.add("Or", [within, lower], "within_or_lower")
+    return graph.add("Or", [allowed, no_torque], "allowed")

@@ -1,0 +1,71 @@
+/* Attitude control policy; see attjax_policy.h. Written by attjax $version. */
+#include "attjax_policy.h"
+
+#include <math.h>
+
+#define FEATURES $features
+
+const float attjax_torque_table[ATTJAX_ACTIONS][3] = $torque_table;
+
+$weights
+$features_function
+/* y = Wx + b. The weights of one input lie side by side. */
+static void layer(int inputs, int outputs, const float *restrict weights,
+                  const float *restrict biases, const float *restrict x, float *restrict y)
+{
+    for (int o = 0; o < outputs; o++) {
+        y[o] = biases[o];
+    }
+    for (int i = 0; i < inputs; i++) {
+        const float *row = weights + i * outputs;
+        for (int o = 0; o < outputs; o++) {
+            y[o] += row[o] * x[i];
+        }
+    }
+}
+
+/* Rectified linear units, in place. */
+static void rectify(int size, float *x)
+{
+    for (int i = 0; i < size; i++) {
+        x[i] = x[i] > 0.0f ? x[i] : 0.0f;
+    }
+}
+
+void attjax_logits(const float quaternion[4], const float angular_velocity[3],
+                   float logits[ATTJAX_ACTIONS])
+{
+$forward
+}
+
+$allow_function
+static int all_finite(const float quaternion[4], const float angular_velocity[3])
+{
+    int result = 1;
+    for (int i = 0; i < 4; i++) {
+        result = result && isfinite(quaternion[i]);
+    }
+    for (int i = 0; i < 3; i++) {
+        result = result && isfinite(angular_velocity[i]);
+    }
+    return result;
+}
+
+int attjax_decide(const float quaternion[4], const float angular_velocity[3])
+{
+    float logits[ATTJAX_ACTIONS];
+    int allowed[ATTJAX_ACTIONS];
+    int best = -1;
+
+    if (!all_finite(quaternion, angular_velocity)) {
+        return ATTJAX_NO_TORQUE;
+    }
+    attjax_logits(quaternion, angular_velocity, logits);
+    allow(angular_velocity, allowed);
+    for (int a = 0; a < ATTJAX_ACTIONS; a++) {
+        if (allowed[a] && (best < 0 || logits[a] > logits[best])) {
+            best = a; /* the first of equal ones */
+        }
+    }
+    return best; /* none is no case: no torque is always allowed */
+}

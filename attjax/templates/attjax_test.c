@@ -1,0 +1,162 @@
+/*
+ * Tests the policy on the machine where it is to fly: the decisions of attjax_vectors.h, numbers
+ * that are not finite, and slews in a closed loop with a rigid body in double precision. Prints
+ * what it finds and the time of a decision; the exit status is 0 if all is well.
+ *
+ *     cc -std=c99 -O2 attjax_test.c attjax_policy.c -o attjax_test -lm && ./attjax_test
+ *
+ * Written by attjax $version.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <time.h>
+
+#include "attjax_policy.h"
+#include "attjax_vectors.h"
+
+#define STATE 7 /* error quaternion, scalar last, and angular velocity */
+#define STEP (1.0 / 240.0)
+#define GOAL_DEG 0.25
+#define DEG_PER_RAD 57.295779513082321
+#define TIMED 200 /* passes over the vectors */
+
+/* Euler's equations and the quaternion's kinematics. */
+static void rate(const double x[STATE], const float torque[3], double dx[STATE])
+{
+    const double *q = x, *w = x + 4;
+
+    dx[0] = 0.5 * (w[2] * q[1] - w[1] * q[2] + w[0] * q[3]);
+    dx[1] = 0.5 * (w[0] * q[2] - w[2] * q[0] + w[1] * q[3]);
+    dx[2] = 0.5 * (w[1] * q[0] - w[0] * q[1] + w[2] * q[3]);
+    dx[3] = -0.5 * (w[0] * q[0] + w[1] * q[1] + w[2] * q[2]);
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        dx[4 + i] = ((inertia[j] - inertia[k]) * w[j] * w[k] + (double)torque[i]) / inertia[i];
+    }
+}
+
+/* One Runge-Kutta step of fourth order. */
+static void advance(double x[STATE], const float torque[3])
+{
+    static const double node[4] = {0.0, 0.5, 0.5, 1.0};
+    static const double weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+    double k[STATE] = {0.0}, sum[STATE] = {0.0}, stage[STATE];
+
+    for (int n = 0; n < 4; n++) {
+        for (int i = 0; i < STATE; i++) {
+            stage[i] = x[i] + node[n] * STEP * k[i];
+        }
+        rate(stage, torque, k);
+        for (int i = 0; i < STATE; i++) {
+            sum[i] += weight[n] * k[i];
+        }
+    }
+    for (int i = 0; i < STATE; i++) {
+        x[i] += STEP * sum[i];
+    }
+}
+
+static double norm(const double *x, int size)
+{
+    double sum = 0.0;
+    for (int i = 0; i < size; i++) {
+        sum += x[i] * x[i];
+    }
+    return sqrt(sum);
+}
+
+/* One control period: the policy decides, fires, and the spacecraft coasts. */
+static void control(double x[STATE])
+{
+    static const float none[3] = {0.0f, 0.0f, 0.0f};
+    float single[STATE];
+    double length;
+
+    for (int i = 0; i < STATE; i++) {
+        single[i] = (float)x[i];
+    }
+    advance(x, attjax_torque_table[attjax_decide(single, single + 4)]);
+    for (int n = 0; n < COASTING_STEPS; n++) {
+        advance(x, none);
+    }
+    length = norm(x, 4);
+    for (int i = 0; i < 4; i++) {
+        x[i] /= length;
+    }
+}
+
+/* Fly the slews; returns how many miss the goal where they do not in attjax. */
+static int fly(void)
+{
+    int failures = 0;
+
+    for (int s = 0; s < SLEWS; s++) {
+        double x[STATE] = {0.0};
+        double error;
+        for (int i = 0; i < 4; i++) {
+            x[i] = slew_start[s][i];
+        }
+        for (int n = 0; n < DECISIONS; n++) {
+            control(x);
+        }
+        error = 2.0 * atan2(norm(x, 3), x[3]) * DEG_PER_RAD;
+        printf("slew %d: error at the end %.6f deg, in attjax %.6f; ", s + 1, error,
+               slew_error_deg[s]);
+        printf("rate %.6f rad/s, in attjax %.6f\n", norm(x + 4, 3), slew_rate[s]);
+        failures += slew_error_deg[s] <= GOAL_DEG && !(error <= GOAL_DEG);
+    }
+    return failures;
+}
+
+/* Returns how many decisions differ from those in attjax. */
+static int compare(void)
+{
+    int failures = 0;
+
+    for (int v = 0; v < VECTORS; v++) {
+        const int action = attjax_decide(vectors[v].quaternion, vectors[v].angular_velocity);
+        failures += action != vectors[v].action;
+    }
+    printf("vectors: %d of %d decisions as in attjax\n", VECTORS - failures, VECTORS);
+    return failures;
+}
+
+/* Returns in how many of its places a number that is not finite does not lead to no torque. */
+static int spoil(void)
+{
+    int failures = 0;
+
+    for (int i = 0; i < STATE; i++) {
+        float x[STATE] = {0.0f, 0.0f, 0.0f, 1.0f, 0.1f, 0.1f, 0.1f};
+        x[i] = NAN;
+        failures += attjax_decide(x, x + 4) != ATTJAX_NO_TORQUE;
+        x[i] = INFINITY;
+        failures += attjax_decide(x, x + 4) != ATTJAX_NO_TORQUE;
+    }
+    printf("not finite: %d of %d lead to no torque\n", 2 * STATE - failures, 2 * STATE);
+    return failures;
+}
+
+static void measure(void)
+{
+    const clock_t start = clock();
+    volatile int sink = 0;
+
+    for (int n = 0; n < TIMED; n++) {
+        for (int v = 0; v < VECTORS; v++) {
+            sink = attjax_decide(vectors[v].quaternion, vectors[v].angular_velocity);
+        }
+    }
+    (void)sink;
+    printf("time: %.0f ns a decision\n",
+           1e9 * (double)(clock() - start) / CLOCKS_PER_SEC / (TIMED * VECTORS));
+}
+
+int main(void)
+{
+    const int failures = compare() + spoil() + fly();
+
+    measure();
+    printf(failures == 0 ? "passed\n" : "FAILED\n");
+    return failures != 0;
+}

@@ -1,0 +1,95 @@
+"""Write a trained attitude controller for flight software: C99, ONNX or StableHLO.
+
+Example:
+    python export.py --checkpoint pretrained/precise --format c --out flight/
+    python export.py --checkpoint ckpt/ --best --frameskip 20 --format onnx --out flight/
+"""
+
+import importlib
+import sys
+from pathlib import Path
+
+from attjax import cli, run_folder
+
+FORMATS = {"c": "export_c", "onnx": "export_onnx", "stablehlo": "export_stablehlo"}
+NEEDED = {"export_onnx": "onnx", "export_stablehlo": "flatbuffers"}
+
+
+def parse_arguments(argv):
+    parser = cli.Parser(prog="export.py", description=__doc__)
+    cli.add_common(parser, seed_help="of the slews that test vectors come from (default: 0)")
+    best_help = "the checkpoint with the least terminal error in training, not the newest"
+    parser.add_argument("--best", action="store_true", help=best_help)
+    format_help = "c: C99, with a test program; onnx (needs the extra onnx); stablehlo (likewise)"
+    parser.add_argument("--format", choices=FORMATS, required=True, help=format_help)
+    out_help = "folder to write into"
+    parser.add_argument("--out", type=Path, metavar="FOLDER", required=True, help=out_help)
+    frameskip_help = "control rate of the flight software, 240/(N + 1) Hz"
+    cli.add_number(parser, "frameskip", int, 5, frameskip_help, low=0, below=10_500)
+    overwrite_help = "replace files that an export wrote before"
+    parser.add_argument("--overwrite", action="store_true", help=overwrite_help)
+    return parser.parse_args(argv)
+
+
+def main(argv=None) -> int:
+    """Export a checkpoint; returns the exit status."""
+    arguments = parse_arguments(argv)
+    with cli.one_line_errors("export.py", run_folder.FolderError):
+        cli.select_device(arguments.device)
+        module = _module(FORMATS[arguments.format])
+        flight = _flight_policy(arguments)
+        _prepare(arguments.out, module.FILES, arguments.overwrite)
+        contents = module.files(flight, arguments.seed or 0)
+        with run_folder.writing(arguments.out):
+            for name, content in contents.items():
+                run_folder.replace(arguments.out / name, content)
+                print(f"wrote {arguments.out / name}")
+    return 0
+
+
+def _module(name):
+    try:
+        return importlib.import_module("attjax." + name)
+    except ModuleNotFoundError as error:
+        if error.name != NEEDED.get(name):
+            raise
+        needed = f"--format needs {error.name}: pip install 'attjax[onnx]'"
+        raise cli.UserError(needed) from None
+
+
+def _flight_policy(arguments):
+    # Imported late: with them, --help and errors in the arguments would take seconds.
+    from attjax import AttitudeEnv, checkpoint
+    from attjax.flight_policy import FlightPolicy
+
+    folder = arguments.checkpoint
+    config = run_folder.read_config(folder)
+    update = checkpoint.best(folder) if arguments.best else checkpoint.latest(folder)
+    policy, params = checkpoint.restore_network(folder, update)
+    origin = f"preset {config.preset}, seed {config.seed}, update {update}"
+    try:
+        return FlightPolicy(policy, params, AttitudeEnv(arguments.frameskip), origin)
+    except ValueError as error:
+        raise cli.UserError(f"{folder} cannot be exported: {error}") from None
+
+
+def _prepare(folder, names, overwrite):
+    """Make the folder and see that it can be written to.
+
+    Files of other names are left alone; those of an export only give way to ``overwrite``.
+    """
+    with run_folder.writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        present = [name for name in names if (folder / name).exists()]
+        if present and not overwrite:
+            raise cli.UserError(
+                f"{folder} holds {present[0]} already: pass --overwrite to replace it, "
+                f"or another --out"
+            )
+        trial = folder / (names[0] + ".tmp")
+        trial.touch()
+        trial.unlink()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

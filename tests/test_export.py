@@ -1,0 +1,217 @@
+"""Exported policies decide as JAX does; export.py writes them, or says in one line why not."""
+
+import ctypes
+import functools
+import re
+
+import exported
+import jax
+import numpy as np
+import pytest
+from commands import ROOT, export_script, one_line_error
+
+from attjax import AttitudeEnv, assembly, export_c, flight_policy
+from attjax.flight_policy import FlightPolicy
+from attjax.networks import Policy
+
+PRECISE = ROOT / "pretrained" / "precise"
+STATES = 20_000
+needs_compiler = pytest.mark.skipif(exported.compiler() is None, reason="there is no C compiler")
+
+
+@functools.cache
+def precise(frameskip):
+    return exported.load(PRECISE, frameskip)
+
+
+@functools.cache
+def flown(frameskip):
+    return flight_policy.flown_decisions(precise(frameskip), 3, 100, STATES // 100)
+
+
+@functools.cache
+def c_files(frameskip):
+    return export_c.files(precise(frameskip), seed=0)
+
+
+@functools.cache
+def untrained(features, hidden_sizes, rate_margin):
+    """Random weights, and biases too, that leave the decision to the state."""
+    policy = Policy(features, hidden_sizes, rate_margin=rate_margin)
+    shapes = jax.eval_shape(lambda: assembly.initial_parameters(policy)["policy"])
+    leaves, tree = jax.tree.flatten(shapes)
+    rng = np.random.default_rng(5)
+    leaves = [rng.normal(0, (0.1, 1.0)[x.ndim - 1], x.shape).astype(np.float32) for x in leaves]
+    params = {"policy": jax.tree.unflatten(tree, leaves)}
+    return FlightPolicy(policy, params, AttitudeEnv(10), "no training")
+
+
+OTHERS = [("state", (24, 8), 0.0), ("state", (16,), 0.99), ("multiscale", (8, 8, 8), 0.0)]
+
+
+@functools.cache
+def random_states(flight):
+    """Decisions at random attitudes and at rates below and above the limit."""
+    rng = np.random.default_rng(0)
+    quaternion = rng.normal(size=(2000, 4))
+    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    return flight_policy.decisions(flight, quaternion, rng.normal(0, 0.25, (2000, 3)))
+
+
+def cases():
+    """Policies with states to compare at: the pretrained one at two rates, and others."""
+    yield from ((precise(frameskip), flown(frameskip)) for frameskip in (5, 20))
+    for case in OTHERS:
+        yield untrained(*case), random_states(untrained(*case))
+
+
+def test_states_are_of_many_kinds():
+    for flight, states in cases():
+        assert np.mean(states.clear) > 0.99
+        assert len(np.unique(states.action)) >= 7, flight.policy
+    masked = random_states(untrained("state", (16,), 0.99)).logits < -1e8
+    assert 0.05 < np.mean(masked) < 0.95
+
+
+@needs_compiler
+def test_c_decides_as_jax(tmp_path):
+    for number, (flight, states) in enumerate(cases()):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        exported.write(folder, export_c.policy_files(flight))
+        assert exported.differing(states, exported.c_actions(folder, states))[0] == 0
+
+
+@needs_compiler
+def test_c_logits_are_those_of_jax(tmp_path):
+    exported.write(tmp_path, c_files(5))
+    library, states, logits = exported.library(tmp_path), flown(5), np.zeros(19, np.float32)
+    for row in range(0, STATES, 500):
+        inputs = states.quaternion[row].copy(), states.angular_velocity[row].copy()
+        library.attjax_logits(*(ctypes.c_void_p(x.ctypes.data) for x in (*inputs, logits)))
+        allowed = states.logits[row] > -1e8
+        np.testing.assert_allclose(logits[allowed], states.logits[row][allowed], atol=2e-3)
+
+
+@needs_compiler
+@pytest.mark.parametrize("frameskip", [5, 20])
+def test_the_c_test_program_passes_and_flies_table_5_as_jax(tmp_path, frameskip):
+    exported.write(tmp_path, c_files(frameskip))
+    printed = exported.run_test_program(tmp_path)
+    assert "500 of 500 decisions" in printed and "14 of 14" in printed
+    assert printed.endswith("passed\n")
+    errors = re.findall(r"at the end ([\d.]+) deg, in attjax ([\d.]+)", printed)
+    assert len(errors) == 3
+    for in_c, in_jax in np.array(errors, float):
+        assert in_c == pytest.approx(in_jax, abs=2e-6) and in_c < 0.001
+
+
+@needs_compiler
+@pytest.mark.parametrize("wrong", ["decisions", "torques"])
+def test_the_c_test_program_notices_what_is_wrong(tmp_path, wrong):
+    contents = c_files(5)
+    source = contents["attjax_policy.c"]
+    if wrong == "decisions":  # the last action that is allowed
+        spoilt = source.replace("logits[a] > logits[best]", "a > best")
+    else:  # thrusters that turn the spacecraft the wrong way
+        table, rest = source.split("weights_1", 1)
+        spoilt = table.replace("0.5f", "-0.5f").replace("--", "") + "weights_1" + rest
+    assert spoilt != source
+    exported.write(tmp_path, contents | {"attjax_policy.c": spoilt})
+    with pytest.raises(AssertionError, match="FAILED"):
+        exported.run_test_program(tmp_path)
+
+
+@needs_compiler
+@pytest.mark.parametrize("case", [("state", (24, 8), 0.0), ("multiscale", (8, 8, 8), 0.0)])
+def test_constants_and_stack_are_as_the_comment_says(tmp_path, case):
+    """All the constants of the C source, added up by the compiler."""
+    flight = untrained(*case)
+    contents = export_c.policy_files(flight)
+    arrays = re.findall(r"^(?:static )?const float (\w+)\[", contents["attjax_policy.c"], re.M)
+    total = " + ".join(f"sizeof({name})" for name in arrays)
+    check = f"\ntypedef char as_said[({total}) == {export_c.constant_bytes(flight)} ? 1 : -1];\n"
+    contents["attjax_policy.c"] += check
+    exported.compile_c(exported.write(tmp_path, contents), "-c", "attjax_policy.c")
+    assert f"{export_c.constant_bytes(flight)} bytes" in contents["attjax_policy.h"]
+
+
+def test_exports_are_the_same_each_time():
+    assert export_c.files(precise(5), seed=0) == c_files(5)
+    assert export_c.test_files(precise(5), seed=1) != export_c.test_files(precise(5), seed=0)
+
+
+def test_onnx_decides_as_jax():
+    export_onnx = pytest.importorskip("attjax.export_onnx", exc_type=ImportError)
+    pytest.importorskip("onnxruntime")
+    for flight, states in cases():
+        model = export_onnx.files(flight)[export_onnx.FILES[0]]
+        action, logits = exported.onnx_outputs(model, states)
+        assert exported.differing(states, action)[0] == 0
+        clear = states.clear
+        np.testing.assert_allclose(logits[clear], states.logits[clear], rtol=1e-4, atol=2e-3)
+
+
+def test_stablehlo_decides_as_jax():
+    export_stablehlo = pytest.importorskip("attjax.export_stablehlo", exc_type=ImportError)
+    for flight, states in cases():
+        program, bytecode = export_stablehlo.files(flight).values()
+        action, logits = exported.stablehlo_outputs(program, states)
+        assert exported.differing(states, action)[0] == 0
+        clear = states.clear
+        np.testing.assert_allclose(logits[clear], states.logits[clear], rtol=1e-4, atol=2e-3)
+        assert bytecode.startswith(b"ML\xefR")  # MLIR's
+
+
+def test_export_writes_only_its_own_files(tmp_path, capsys):
+    out = tmp_path / "flight"
+    out.mkdir()
+    for name in ("main.c", "attjax_policy.c"):
+        (out / name).write_text("mine")
+    arguments = ["--checkpoint", str(PRECISE), "--format", "c", "--out", str(out), "--device=cpu"]
+    error = one_line_error(export_script.main, arguments, capsys)
+    assert "holds attjax_policy.c already" in error and "--overwrite" in error
+    assert {path.read_text() for path in out.iterdir()} == {"mine"}
+    assert export_script.main([*arguments, "--overwrite", "--frameskip", "20"]) == 0
+    assert {path.name for path in out.iterdir()} == {"main.c", *export_c.FILES}
+    assert (out / "main.c").read_text() == "mine"
+    header = (out / "attjax_policy.h").read_text()
+    assert "CONTROL_PERIOD 0.0875f" in header and "preset precise, seed 2, update 306" in header
+
+
+def test_bad_export_arguments(tmp_path, capsys):
+    file = tmp_path / "file"
+    file.write_text("text")
+    good = {"--checkpoint": PRECISE, "--format": "c", "--out": tmp_path / "out"}
+    for flag, value, named in (
+        ("--format", "fortran", "stablehlo"),
+        ("--frameskip", -1, "frameskip is -1"),
+        ("--checkpoint", tmp_path / "no", "there is no checkpoint folder"),
+        ("--checkpoint", tmp_path, "no attjax checkpoint"),
+        ("--out", file, "cannot be written"),
+        ("--out", file / "below", "cannot be written"),
+        ("--out", "/proc/nowhere", "cannot be written"),
+    ):
+        flags = [str(x) for pair in (good | {flag: value}).items() for x in pair]
+        assert named in one_line_error(export_script.main, [*flags, "--device", "cpu"], capsys)
+    for missing in ("--format", "--out"):
+        flags = [str(x) for pair in good.items() if pair[0] != missing for x in pair]
+        assert missing in one_line_error(export_script.main, flags, capsys)
+    assert {path.name for path in tmp_path.iterdir()} == {"file"}
+
+
+def test_a_missing_extra_is_named(tmp_path, capsys, monkeypatch):
+    def import_module(name):
+        raise ModuleNotFoundError("No module named 'onnx'", name="onnx")
+
+    monkeypatch.setattr(export_script.importlib, "import_module", import_module)
+    arguments = ["--checkpoint", str(PRECISE), "--format", "onnx", "--out", str(tmp_path / "x")]
+    error = one_line_error(export_script.main, [*arguments, "--device", "cpu"], capsys)
+    assert "pip install 'attjax[onnx]'" in error
+
+
+def test_policies_that_cannot_fly_are_refused():
+    flight = untrained("state", (16,), 0.99)
+    broken = jax.tree.map(lambda x: x * np.nan, flight.params)
+    with pytest.raises(ValueError, match="not finite"):
+        FlightPolicy(flight.policy, broken, flight.env, "")
