@@ -7,7 +7,7 @@ EXTRAS ?= test
 CHECKPOINT ?= ckpt
 BIN := $(VENV)/bin
 
-.PHONY: train test test-all eval lint setup
+.PHONY: train test test-all test-peers eval lint setup
 
 train: setup
 	$(BIN)/python train.py --num-envs 2048 --checkpoint $(CHECKPOINT) $(ARGS)
@@ -27,6 +27,21 @@ test-all:
 	        echo "python$$version is not here: skipped"; \
 	    fi; \
 	done
+
+# Gymnasium and Stable-Baselines3, then gymnax and rejax: each pair where its own pins fit. PyTorch's
+# default Linux wheels hold CUDA; PIP_EXTRA_INDEX_URL can name an index of smaller ones.
+test-peers: $(VENV)-gym/installed $(VENV)-rejax/installed
+	$(VENV)-gym/bin/python -m pytest tests/test_gymnasium.py tests/test_sb3.py \
+	    tests/test_readme.py attjax/gymnasium_env.py attjax/sb3.py $(ARGS)
+	$(VENV)-rejax/bin/python -m pytest tests/test_gymnax.py tests/test_gymnasium.py \
+	    tests/test_readme.py attjax/gymnax_compat.py $(ARGS)
+
+$(VENV)-gym/installed: PACKAGES = '.[test,gym]' torch stable-baselines3
+$(VENV)-rejax/installed: PACKAGES = '.[test]' gymnax rejax
+$(VENV)-gym/installed $(VENV)-rejax/installed: pyproject.toml
+	$(PYTHON) -m venv $(@D)
+	$(@D)/bin/python -m pip install --quiet --disable-pip-version-check --editable $(PACKAGES)
+	touch $@
 
 lint: setup
 	$(BIN)/ruff check .

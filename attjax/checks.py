@@ -4,6 +4,8 @@ Shapes and types are always checked. Values are checked where there are any: ins
 ``vmap`` arrays have none yet.
 """
 
+import operator
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -62,6 +64,38 @@ def integer(name: str, x, low: int, high: int):
     if has_value(x) and not low <= np.asarray(x) <= high:
         raise ValueError(f"{name} is {x}; it must be from {low} to {high}")
     return x
+
+
+def action(x, count: int) -> int:
+    """Return x as an integer from 0 to count − 1, for steps from Python.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    try:
+        x = operator.index(x)
+    except TypeError:
+        raise ValueError(f"action is {x!r}; it must be an integer") from None
+    if not 0 <= x < count:
+        raise ValueError(f"action is {x}; it must be from 0 to {count - 1}")
+    return x
+
+
+def actions(x, batch: int, count: int) -> np.ndarray:
+    """Return x as (batch,) integers from 0 to count − 1, int32, for steps from Python.
+
+    Raises:
+        ValueError: they are something else.
+    """
+    x = np.asarray(x)
+    if x.shape != (batch,) or not np.issubdtype(x.dtype, np.integer):
+        raise ValueError(
+            f"actions has shape {x.shape} and type {x.dtype}; it must be ({batch},) integers"
+        )
+    for extreme in (x.min(), x.max()):
+        if not 0 <= extreme < count:
+            raise ValueError(f"actions holds {extreme}; each must be from 0 to {count - 1}")
+    return x.astype(np.int32)
 
 
 def unit_quaternion(name: str, x):

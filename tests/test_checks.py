@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, EnvState, controllers, dynamics, step, vector
+from attjax import AttitudeEnv, EnvState, checks, controllers, dynamics, step, vector
 from attjax.networks import Policy
 
 ENV = AttitudeEnv(frameskip=5)
@@ -126,3 +126,18 @@ def test_inside_jit_and_vmap_shapes_and_types_are_checked():
     )
     flown = jax.jit(jax.vmap(step))(states, np.array([18, 99]))
     np.testing.assert_array_equal(flown.angular_velocity[0], flown.angular_velocity[1])
+
+
+@pytest.mark.parametrize("action", [0, 18, np.int64(3), np.array(3)])
+def test_actions_from_python_pass(action):
+    assert checks.action(action, 19) == int(action)
+    passed = checks.actions([action, 0], 2, 19)
+    assert passed.dtype == np.int32 and passed.tolist() == [int(action), 0]
+
+
+@pytest.mark.parametrize("action", [-1, 19, 0.5, None, "up", [1, 2]])
+def test_actions_from_python_are_refused_in_one_line(action):
+    with pytest.raises(ValueError, match=r"^action is .*; it must be [^\n]*$"):
+        checks.action(action, 19)
+    with pytest.raises(ValueError, match=r"^actions (has|holds) .*; (it|each) must be [^\n]*$"):
+        checks.actions([action] if np.ndim(action) == 0 else action, 1, 19)

@@ -1,17 +1,20 @@
 """One-way imports, as in README.md: a module knows only those of earlier layers."""
 
 import ast
+import re
+import tomllib
 from pathlib import Path
 
 import attjax
 
 LAYERS = [
-    {"settings", "checks", "context", "spaces", "kernel", "vector"},
+    {"settings", "checks", "context", "spaces", "kernel", "vector", "sb3"},
+    {"programs"},
     {"quaternion", "rigid_body"},
     {"dynamics"},
     {"spacecraft", "reward", "observation"},
     {"env"},
-    {"controllers"},
+    {"controllers", "gymnasium_env", "gymnax_compat"},
     {"networks", "losses"},
     {"learner", "evaluation"},
     {"rollout", "descent"},
@@ -23,6 +26,8 @@ LAYERS = [
 ]
 LEARNING = {"networks", "losses", "learner", "rollout", "descent", "ppo"}
 SPACECRAFT = {"spacecraft", "reward", "env"}
+PEERS = {"gymnasium", "gymnax", "rejax", "stable_baselines3", "torch"}
+FOR_PEERS = {"gymnasium_env", "gymnax_compat", "sb3"}
 FOLDER = Path(attjax.__file__).parent
 
 
@@ -57,3 +62,21 @@ def test_learning_never_hears_of_spacecraft_and_physics_never_of_learning():
         assert not imports(module) & SPACECRAFT, module
     for module in SPACECRAFT | {"quaternion", "dynamics", "observation"}:
         assert not imports(module) & LEARNING, module
+
+
+def packages(module):
+    """The packages that a module imports."""
+    for node in ast.walk(ast.parse((FOLDER / f"{module}.py").read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield (node.module or "").split(".")[0]
+
+
+def test_the_core_knows_no_peers():
+    for module in set().union(*LAYERS) - FOR_PEERS:
+        assert not PEERS & set(packages(module)), module
+        assert not FOR_PEERS & imports(module), module
+    project = tomllib.loads((FOLDER.parent / "pyproject.toml").read_text())["project"]
+    names = {re.split(r"[^\w-]", text)[0].replace("-", "_") for text in project["dependencies"]}
+    assert "jax" in names and not PEERS & names

@@ -1,0 +1,94 @@
+"""Stable-Baselines3 on Gymnasium's vectors: its algorithms take a ``VecEnv`` of their own.
+
+It needs Stable-Baselines3, which no extra of attjax installs.
+"""
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from stable_baselines3.common.vec_env import VecEnv
+
+
+def as_vec_env(
+    vector_env: VectorEnv, reward_scale: float = 1.0, time_limit_terminates: bool = False
+) -> VecEnv:
+    """A Gymnasium vector as one of Stable-Baselines3, without a copy of the environment.
+
+    Args:
+        vector_env: with autoreset mode SAME_STEP, as ``gymnasium.make_vec("attjax/Slew-v0")``.
+        reward_scale: factor of the rewards.
+        time_limit_terminates: the time limit is learned as an end, which is right for a reward
+            that holds a terminal one, as the paper's does. Otherwise Stable-Baselines3 adds
+            the value of the final observation, which is right for the logarithmic reward.
+
+    Raises:
+        ValueError: the autoreset mode is another.
+    """
+    return GymnasiumVecEnv(vector_env, reward_scale, time_limit_terminates)
+
+
+class GymnasiumVecEnv(VecEnv):
+    """What :func:`as_vec_env` returns.
+
+    At an episode's end the info of its environment has ``terminal_observation``,
+    ``TimeLimit.truncated`` (false where the time limit is learned as an end) and, where the
+    environment tells it, ``is_success``, which Stable-Baselines3 logs.
+    """
+
+    def __init__(self, vector_env, reward_scale, time_limit_terminates):
+        mode = vector_env.metadata.get("autoreset_mode")
+        if mode != AutoresetMode.SAME_STEP:
+            raise ValueError(f"autoreset_mode is {mode}; it must be {AutoresetMode.SAME_STEP}")
+        self.vector_env = vector_env
+        self.reward_scale = np.float32(reward_scale)
+        self.time_limit_terminates = time_limit_terminates
+        super().__init__(
+            vector_env.num_envs,
+            vector_env.single_observation_space,
+            vector_env.single_action_space,
+        )
+
+    def reset(self):
+        """Start all episodes; observations (num_envs, ...). The first environment's seed rules."""
+        observations, _ = self.vector_env.reset(seed=self._seeds[0])
+        self._reset_seeds()
+        return observations
+
+    def step_async(self, actions):
+        """Keep the actions for :meth:`step_wait`."""
+        self._actions = actions
+
+    def step_wait(self):
+        """Observations, rewards (num_envs,), ends (num_envs,) and a list of infos."""
+        observations, rewards, terminated, truncated, info = self.vector_env.step(self._actions)
+        infos = [{} for _ in range(self.num_envs)]
+        ended = terminated | truncated
+        final_info = info.get("final_info", {})
+        for i in np.flatnonzero(ended):
+            infos[i]["terminal_observation"] = info["final_obs"][i]
+            infos[i]["TimeLimit.truncated"] = bool(
+                truncated[i] and not terminated[i] and not self.time_limit_terminates
+            )
+            if "success_rate" in final_info:
+                infos[i]["is_success"] = bool(final_info["success_rate"][i])
+        return observations, rewards * self.reward_scale, ended, infos
+
+    def close(self):
+        """Close the vector."""
+        self.vector_env.close()
+
+    def get_attr(self, attr_name, indices=None):
+        """The vector's attribute, once for each environment."""
+        return [getattr(self.vector_env, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name, value, indices=None):
+        """Set the vector's attribute, which all environments share."""
+        setattr(self.vector_env, attr_name, value)
+
+    def env_method(self, method_name, *method_args, indices=None, **method_kwargs):
+        """The result of the vector's method, once for each environment."""
+        result = getattr(self.vector_env, method_name)(*method_args, **method_kwargs)
+        return [result for _ in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class, indices=None):
+        """No environment is."""
+        return [False for _ in self._get_indices(indices)]
