@@ -10,6 +10,7 @@ import logging
 import re
 import shutil
 import sys
+import traceback
 from pathlib import Path
 
 import jax
@@ -37,7 +38,9 @@ _unraisable = sys.unraisablehook
 
 def _hook(unraisable):
     """Print no traceback of what Orbax leaves be where another array's file fails."""
-    if str(unraisable.exc_value) != "Event loop is closed":
+    files = [frame.filename for frame in traceback.extract_tb(unraisable.exc_traceback)]
+    is_orbax = any("orbax" in Path(file).parts for file in files)
+    if not is_orbax and str(unraisable.exc_value) != "Event loop is closed":
         _unraisable(unraisable)
 
 

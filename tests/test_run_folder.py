@@ -23,7 +23,7 @@ def test_a_configuration_that_cannot_be_written_leaves_the_old_one(tmp_path, mon
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(run_folder.Path, "write_text", full)
+    monkeypatch.setattr(run_folder.os, "replace", full)
     with pytest.raises(FolderError, match="No space left on device"):
         run_folder.write_config(tmp_path, run_folder.Config("paper", 1, CONFIG.settings))
     assert run_folder.read_config(tmp_path) == CONFIG
