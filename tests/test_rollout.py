@@ -27,6 +27,18 @@ def test_spacecraft_are_shared_out_among_the_control_rates():
         np.testing.assert_allclose(features[group, -2], 10 * period, rtol=1e-6)
 
 
+def test_rollout_and_gradient_steps_each_leave_a_fresh_key():
+    """A key used twice, in a rollout and for its shuffles, would tie them to each other."""
+    setup = small_attitude_setup(2)
+    env_params = assembly.env_params(setup)
+    state = learner.init(setup, env_params, jax.random.key(0))
+    flown, _ = fly(setup, env_params, state)
+    keys = [np.array(jax.random.key_data(x.key)) for x in (state, flown)]
+    trained, _ = ppo.train_block(setup, env_params, state, 1)
+    keys.append(np.array(jax.random.key_data(trained.key)))
+    assert len(np.unique(keys, axis=0)) == 3
+
+
 @pytest.mark.parametrize("share", [0.0, 0.125])
 def test_a_share_of_the_spacecraft_acts_greedily(share):
     setup = small_attitude_setup(1, greedy_share=share)
