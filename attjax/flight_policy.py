@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import dynamics, evaluation, networks, rigid_body
+from attjax import evaluation, networks
 from attjax import observation as observations
 from attjax import quaternion as quaternions
 from attjax.context import Context
@@ -114,14 +114,8 @@ class FlightPolicy:
         """The mask, None if the policy has none."""
         if self.policy.rate_margin == 0:
             return None
-        context = self.context
-        form = rigid_body.peak_rate_form(context.inertia)
-        at_rest = jnp.zeros(3, context.inertia.dtype)
-        impulse = dynamics.rate_after_impulse(at_rest, context.torque_table, context.inertia)
-        own_gain = jnp.sum(jnp.matmul(impulse, form, precision="highest") * impulse, -1)
-        limit_squared = (self.policy.rate_margin * context.rate_limit) ** 2
-        arrays = (form, impulse, own_gain, limit_squared)
-        return RateMask(*(np.asarray(x, np.float32)[()] for x in arrays))
+        constants = networks.rate_mask_constants(self.context, self.policy.rate_margin)
+        return RateMask(*(np.asarray(x, np.float32)[()] for x in constants))
 
 
 def decide(flight: FlightPolicy, quaternion, angular_velocity):

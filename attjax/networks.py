@@ -179,13 +179,24 @@ def rate_mask(observation: chex.Array, context: Context, margin: float) -> chex.
         (actions,) bool.
     """
     angular_velocity = observation[observations.ANGULAR_VELOCITY]
-    form = rigid_body.peak_rate_form(context.inertia)
-    at_rest = jnp.zeros_like(angular_velocity)
-    impulse = dynamics.rate_after_impulse(at_rest, context.torque_table, context.inertia)
+    form, impulse, own_gain, limit_squared = rate_mask_constants(context, margin)
     gradient = jnp.matmul(form, angular_velocity, precision="highest")
-    weighted = jnp.matmul(impulse, form, precision="highest")
     # The peak's square after ω + Δω, less that before: a product for all actions at once.
-    gain = 2 * jnp.matmul(impulse, gradient, precision="highest") + jnp.sum(weighted * impulse, -1)
+    gain = 2 * jnp.matmul(impulse, gradient, precision="highest") + own_gain
     peak_squared = jnp.sum(gradient * angular_velocity) + gain
     coasts = jnp.all(context.torque_table == 0, axis=-1)
-    return coasts | (peak_squared <= (margin * context.rate_limit) ** 2) | (gain < 0)
+    return coasts | (peak_squared <= limit_squared) | (gain < 0)
+
+
+def rate_mask_constants(context: Context, margin: float) -> tuple[chex.Array, ...]:
+    """What :func:`rate_mask` needs of a spacecraft, whatever its state.
+
+    Returns:
+        The (3, 3) form A of the peak rate, the (actions, 3) changes Δω of the rate, rad/s, their
+        (actions,) own gains Δω·AΔω, and the square of the rate that is kept, rad²/s².
+    """
+    form = rigid_body.peak_rate_form(context.inertia)
+    at_rest = jnp.zeros(3, context.inertia.dtype)
+    impulse = dynamics.rate_after_impulse(at_rest, context.torque_table, context.inertia)
+    own_gain = jnp.sum(jnp.matmul(impulse, form, precision="highest") * impulse, axis=-1)
+    return form, impulse, own_gain, (margin * context.rate_limit) ** 2

@@ -9,7 +9,6 @@ Example:
 
 import argparse
 import ctypes
-import functools
 import shutil
 import subprocess
 import tempfile
@@ -150,7 +149,7 @@ def _in_float32(flight):
     from attjax import evaluation, quaternion
 
     params = flight.env.default_params
-    act = jax.tree_util.Partial(functools.partial(flight.policy.act), flight.params)
+    act = jax.tree_util.Partial(flight.policy.act, flight.params)
     start, steps = evaluation.table_5_slews(), int(params.max_steps_in_episode)
     history = evaluation.record(act, flight.env, params, start, steps)
     angles = jnp.rad2deg(jax.vmap(quaternion.error_angle)(history.quaternion[-1]))
