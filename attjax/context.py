@@ -3,6 +3,8 @@
 import chex
 from flax import struct
 
+from attjax.specification import INTEGRATION_STEP
+
 
 @struct.dataclass
 class Context:
@@ -13,9 +15,11 @@ class Context:
         inertia: (3,) principal moments or (3, 3) tensor, body frame, kg m².
         torque_table: (actions, 3) torque of each action, body frame, N m.
         rate_limit: largest admissible ‖ω‖, rad/s.
+        torque_duration: how long a torque acts, from the beginning of a control period, s.
     """
 
     control_period: chex.Array
     inertia: chex.Array
     torque_table: chex.Array
     rate_limit: chex.Array
+    torque_duration: chex.Array = INTEGRATION_STEP

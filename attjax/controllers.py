@@ -7,7 +7,7 @@ action whose impulse comes nearest to the one that leads there.
 import chex
 import jax.numpy as jnp
 
-from attjax import checks, dynamics, rigid_body
+from attjax import checks, rigid_body
 from attjax import observation as observations
 from attjax import quaternion as quaternions
 from attjax.context import Context
@@ -64,9 +64,9 @@ def quaternion_feedback(observation: chex.Array, context: Context) -> chex.Array
 
 
 def average_torque(context: Context) -> chex.Array:
-    """Largest torque, averaged over a control period, N m: it acts for one RK4 step of it."""
+    """Largest torque, averaged over a control period, N m: it may act for a part of it."""
     largest = jnp.max(jnp.sqrt(jnp.sum(context.torque_table**2, axis=-1)))
-    return largest * dynamics.INTEGRATION_STEP / context.control_period
+    return largest * context.torque_duration / context.control_period
 
 
 def nearest_action(wanted_rate, observation, context: Context) -> chex.Array:
@@ -78,7 +78,7 @@ def nearest_action(wanted_rate, observation, context: Context) -> chex.Array:
     scale = jnp.minimum(1.0, RATE_MARGIN * context.rate_limit / jnp.maximum(rate, 1e-12))
     change = wanted_rate * scale - observation[observations.ANGULAR_VELOCITY]
     impulse = rigid_body.angular_momentum(context.inertia, change)
-    missing = context.torque_table * dynamics.INTEGRATION_STEP - impulse
+    missing = context.torque_table * context.torque_duration - impulse
     return jnp.argmin(jnp.sum(missing**2, axis=-1))
 
 

@@ -14,9 +14,7 @@ import numpy as np
 from attjax import checks, rigid_body
 from attjax import quaternion as quaternions
 from attjax.kernel import one_loop
-
-INTEGRATION_STEP = 1 / 240
-"""Length of one RK4 step, s (paper, section 2.3)."""
+from attjax.specification import INTEGRATION_STEP
 
 PRODUCTS = ((1, 2), (2, 0), (0, 1), (0, 0), (1, 1), (2, 2))
 """The products ωⱼ ωₖ of which the gyroscopic acceleration is made."""
@@ -25,9 +23,6 @@ _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)).transpose(2, 0, 1)
 
 STEPS_IN_LINE = 20
 """Torque-free RK4 steps compiled for CPU one after another before there is a loop over them."""
-
-LM50_INERTIA = (0.872, 0.115, 0.797)
-"""Principal moments of inertia of the LM50 bus, kg m²."""
 
 
 def rk4_step(quaternion, angular_velocity, torque, inertia, dt=INTEGRATION_STEP):
@@ -49,7 +44,7 @@ def rk4_step(quaternion, angular_velocity, torque, inertia, dt=INTEGRATION_STEP)
 
     Example:
         >>> q, w = rk4_step(jnp.array([0.0, 0.0, 0.0, 1.0]), jnp.zeros(3),
-        ...                 jnp.array([0.872, 0.0, 0.0]), jnp.array(LM50_INERTIA), 1 / 240)
+        ...                 jnp.array([0.872, 0.0, 0.0]), jnp.array([0.872, 0.115, 0.797]))
         >>> round(w[0].item() * 240, 6)
         1.0
     """
@@ -62,7 +57,9 @@ def rk4_step(quaternion, angular_velocity, torque, inertia, dt=INTEGRATION_STEP)
     return jnp.stack(state[:4]), jnp.stack(state[4:])
 
 
-def propagate(quaternion, angular_velocity, torque, inertia, frameskip, coasting_steps=None):
+def propagate(
+    quaternion, angular_velocity, torque, inertia, frameskip, steps_after=None, held=False
+):
     """One agent step: an RK4 step with the torque on, then ``frameskip`` torque-free ones.
 
     Eq. 9 is linear in q, so the one normalisation at the end equals the paper's
@@ -71,27 +68,28 @@ def propagate(quaternion, angular_velocity, torque, inertia, frameskip, coasting
 
     Args:
         quaternion, angular_velocity, torque, inertia: as in :func:`rk4_step`.
-        frameskip: number of torque-free RK4 steps, a Python integer.
-        coasting_steps: how many of these are taken, scalar; None: all. Under ``vmap`` it lets
+        frameskip: number of RK4 steps after the first, a Python integer.
+        steps_after: how many of these are taken, scalar; None: all. Under ``vmap`` it lets
             spacecraft of different control rates share one program.
+        held: whether the torque stays on in these steps, a Python bool.
 
     Returns:
         The unit quaternion (4,) and the angular velocity (3,) after (1 + frameskip)/240 s, or
-        after (1 + coasting_steps)/240 s.
+        after (1 + steps_after)/240 s.
     """
     quaternion, angular_velocity, torque, inertia = _checked(
         quaternion, angular_velocity, torque, inertia
     )
     gyroscopic, acceleration = _euler_terms(inertia, torque)
     start = (*quaternion, *angular_velocity)
-    limit = () if coasting_steps is None else (jnp.asarray(coasting_steps, quaternion.dtype),)
-    change = _change(frameskip, start, acceleration, gyroscopic, limit)
+    limit = () if steps_after is None else (jnp.asarray(steps_after, quaternion.dtype),)
+    change = _change((frameskip, held), start, acceleration, gyroscopic, limit)
     state = _add(start, change)
     return quaternions.normalize(jnp.stack(state[:4])), jnp.stack(state[4:])
 
 
-def rate_after_impulse(angular_velocity, torque, inertia):
-    """Angular velocity right after one RK4 step's worth of torque, to first order.
+def rate_after_impulse(angular_velocity, torque, inertia, duration=INTEGRATION_STEP):
+    """Angular velocity after a torque that lasts for ``duration``, s, to first order.
 
     Args:
         angular_velocity: (3,) body-frame angular velocity, rad/s.
@@ -102,9 +100,9 @@ def rate_after_impulse(angular_velocity, torque, inertia):
         (..., 3) angular velocities ω + I⁻¹ M Δt, rad/s.
     """
     if inertia.ndim == 1:
-        return angular_velocity + torque / inertia * INTEGRATION_STEP
+        return angular_velocity + torque / inertia * duration
     acceleration = jnp.matmul(torque, rigid_body.inverse(inertia), precision="highest")
-    return angular_velocity + acceleration * INTEGRATION_STEP
+    return angular_velocity + acceleration * duration
 
 
 def _checked(quaternion, angular_velocity, torque, inertia):
@@ -147,40 +145,45 @@ def _gyroscopic_acceleration(angular_velocity, gyroscopic):
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _change(frameskip, start, acceleration, gyroscopic, limit):
+def _change(kind, start, acceleration, gyroscopic, limit):
     """Change of the state over one agent step, compiled as is best for the device.
 
-    ``limit`` is empty, or holds the number of torque-free steps to take.
+    ``kind`` is frameskip and held. ``limit`` is empty, or holds the number of steps to take after
+    the first.
     """
     return jax.lax.platform_dependent(
         start,
         acceleration,
         gyroscopic,
         limit,
-        cpu=functools.partial(_change_in_line, frameskip),
-        default=functools.partial(_change_by_scan, frameskip),
+        cpu=functools.partial(_change_in_line, kind),
+        default=functools.partial(_change_by_scan, kind),
     )
 
 
 @_change.defjvp
-def _change_jvp(frameskip, primals, tangents):
-    return jax.jvp(functools.partial(_change_by_scan, frameskip), primals, tangents)
+def _change_jvp(kind, primals, tangents):
+    return jax.jvp(functools.partial(_change_by_scan, kind), primals, tangents)
 
 
-def _change_by_scan(frameskip, *parts):
-    return _change_with(lambda function, *scalars: function(*scalars), 1, frameskip, *parts)
+def _change_by_scan(kind, *parts):
+    return _change_with(lambda function, *scalars: function(*scalars), 1, kind, *parts)
 
 
-def _change_in_line(frameskip, *parts):
+def _change_in_line(kind, *parts):
     """The same from the same functions, each RK4 step one loop over the batch."""
-    return _change_with(one_loop, max(1, min(frameskip, STEPS_IN_LINE)), frameskip, *parts)
+    return _change_with(one_loop, max(1, min(kind[0], STEPS_IN_LINE)), kind, *parts)
 
 
-def _change_with(call, unroll, frameskip, start, acceleration, gyroscopic, limit):
+def _change_with(call, unroll, kind, start, acceleration, gyroscopic, limit):
+    frameskip, held = kind
+    later_step, later_torque = (_held_step, acceleration) if held else (_coasting_step, ())
+    if limit:
+        later_step = _due_held_step if held else _due_coasting_step
+
     def step(change, index):
-        if limit:
-            return call(_due_step, index, *limit, *start, *change, *gyroscopic), None
-        return call(_coasting_step, *start, *change, *gyroscopic), None
+        due = (index, *limit) if limit else ()
+        return call(later_step, *due, *start, *change, *later_torque, *gyroscopic), None
 
     change = call(_torque_step, *start, *acceleration, *gyroscopic)
     indices = jnp.arange(frameskip, dtype=start[0].dtype)
@@ -199,10 +202,30 @@ def _coasting_step(*scalars):
     return _add(change, _rk4_increment(state, gyroscopic, None, INTEGRATION_STEP))
 
 
-def _due_step(index, limit, *scalars):
-    """The same if it is one of the first ``limit`` steps, else no further change."""
-    change, later = scalars[7:14], _coasting_step(*scalars)
-    return tuple(jnp.where(index < limit, b, a) for a, b in zip(change, later))
+def _held_step(*scalars):
+    """The same under torque; scalars: start (7), change (7), I⁻¹ M (3), inertia terms."""
+    start, change, acceleration, gyroscopic = (
+        scalars[:7],
+        scalars[7:14],
+        scalars[14:17],
+        scalars[17:],
+    )
+    state = _add(start, change)
+    return _add(change, _rk4_increment(state, gyroscopic, acceleration, INTEGRATION_STEP))
+
+
+def _due_coasting_step(index, limit, *scalars):
+    """A coasting step if it is one of the first ``limit`` steps, else no further change."""
+    return _if_due(index < limit, scalars[7:14], _coasting_step(*scalars))
+
+
+def _due_held_step(index, limit, *scalars):
+    """The same of a step under torque."""
+    return _if_due(index < limit, scalars[7:14], _held_step(*scalars))
+
+
+def _if_due(is_due, change, later):
+    return tuple(jnp.where(is_due, b, a) for a, b in zip(change, later))
 
 
 def _add(state, change):

@@ -7,12 +7,13 @@ import chex
 import jax
 import jax.numpy as jnp
 
-from attjax import dynamics, rigid_body, spacecraft, spaces
 from attjax import observation as observations
 from attjax import quaternion as quaternions
+from attjax import rigid_body, spacecraft, spaces
 from attjax.context import Context
 from attjax.reward import Transition, paper_reward
-from attjax.spacecraft import EPISODE_RK4_STEPS, TORQUE_TABLE, EnvParams, EnvState
+from attjax.spacecraft import EnvParams, EnvState
+from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,13 +21,14 @@ class AttitudeEnv:
     """The slew task as an environment; by default exactly the paper's MDP.
 
     Attributes:
-        frameskip: torque-free RK4 steps in an agent step: 20 is 11.43 Hz, 5 is 40 Hz. With
+        frameskip: RK4 steps after the first in an agent step: 20 is 11.43 Hz, 5 is 40 Hz. With
             ``params.frameskip``, the most there may be.
         reward: function of a :class:`attjax.reward.Transition`.
         initial_state: function of a key and parameters that draws the start of an episode.
+        spacecraft: what flies, and its task; ``default_params`` are its.
 
     Raises:
-        ValueError: frameskip is not an integer from 0 to 10,499.
+        ValueError: frameskip is no integer from 0 on, or an agent step exceeds the episode.
 
     Example:
         >>> env = AttitudeEnv(frameskip=20)
@@ -38,41 +40,42 @@ class AttitudeEnv:
     frameskip: int = 20
     reward: Callable[[Transition], chex.Array] = paper_reward
     initial_state: Callable[[chex.PRNGKey, EnvParams], EnvState] = spacecraft.initial_state
+    spacecraft: Spacecraft = LM50
 
     def __post_init__(self):
-        valid = isinstance(self.frameskip, int) and 0 <= self.frameskip < EPISODE_RK4_STEPS
-        if not valid:
+        most = self.spacecraft.max_steps(0) - 1
+        if not (isinstance(self.frameskip, int) and 0 <= self.frameskip <= most):
             raise ValueError(
-                f"frameskip is {self.frameskip!r}; it must be an integer "
-                f"from 0 to {EPISODE_RK4_STEPS - 1}"
+                f"frameskip is {self.frameskip!r}; it must be an integer from 0 to {most}"
             )
 
     name = "AttitudeEnv"
 
     @property
     def num_actions(self) -> int:
-        """Rows of Table 1."""
-        return len(TORQUE_TABLE)
+        """Torques to choose from; the paper's Table 1 has 19."""
+        return self.spacecraft.num_actions
 
     @property
     def control_period(self) -> float:
         """Time between two actions, s."""
-        return (1 + self.frameskip) * dynamics.INTEGRATION_STEP
+        return (1 + self.frameskip) * INTEGRATION_STEP
 
     @property
     def default_params(self) -> EnvParams:
-        """The paper's spacecraft and task at this frameskip."""
-        return spacecraft.default_params(self.frameskip)
+        """The spacecraft and its task at this frameskip."""
+        return spacecraft.default_params(self.frameskip, self.spacecraft)
 
     def context(self, params: EnvParams) -> Context:
         """What a controller may know of this environment."""
         period = self._period(params)
-        return Context(period, params.inertia, params.torque_table, params.rate_limit)
+        duration = period if self.spacecraft.torque_held else INTEGRATION_STEP
+        return Context(period, params.inertia, params.torque_table, params.rate_limit, duration)
 
     def _period(self, params):
         frameskip = self.frameskip if params.frameskip is None else params.frameskip
         rk4_steps = jnp.asarray(1 + frameskip, jnp.asarray(params.inertia).dtype)
-        return rk4_steps * dynamics.INTEGRATION_STEP
+        return rk4_steps * INTEGRATION_STEP
 
     def reset(self, key: chex.PRNGKey, params: EnvParams | None = None):
         """Start an episode. Returns the observation (11,) and the state.
@@ -125,7 +128,8 @@ class AttitudeEnv:
             the spacecraft after the step and is meant to be read at an episode's end.
         """
         del key
-        next_state = spacecraft.step(state, action, params, self.frameskip)
+        held = self.spacecraft.torque_held
+        next_state = spacecraft.step(state, action, params, self.frameskip, held)
         rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2))
         terminated = rate > params.rate_limit
         truncated = ~terminated & (next_state.time >= params.max_steps_in_episode)
@@ -158,12 +162,13 @@ class AttitudeEnv:
         Coasting can raise ‖ω‖ at constant energy by at most √(I_max/I_min).
         """
         moments = rigid_body.principal_moments(params.inertia)
-        kick = jnp.max(jnp.abs(params.torque_table)) * dynamics.INTEGRATION_STEP / jnp.min(moments)
+        impulse = jnp.max(jnp.abs(params.torque_table)) * self.context(params).torque_duration
+        kick = impulse / jnp.min(moments)
         rate = (params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))
         one = jnp.ones_like(rate)
         high = jnp.stack([one] * 4 + [rate / 2] * 4 + [rate] * 3)
         return spaces.Box(-high, high)
 
     def action_space(self, params: EnvParams | None = None) -> spaces.Discrete:
-        """The 19 rows of Table 1."""
-        return spaces.Discrete(len(TORQUE_TABLE) if params is None else len(params.torque_table))
+        """The rows of the torque table."""
+        return spaces.Discrete(self.num_actions if params is None else len(params.torque_table))

@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import dynamics, spacecraft
 from attjax import observation as observations
 from attjax import quaternion as quaternions
+from attjax import rigid_body, spacecraft
 from attjax.context import Context
 from attjax.controllers import average_torque
 from attjax.env import AttitudeEnv
@@ -113,7 +113,7 @@ def fly(
             overspeed=terminated,
             last_outside=jnp.where(angle > params.goal_angle, index + 1, so_far.last_outside),
             score=so_far.score + info["score"],
-            impulse=so_far.impulse + torque * dynamics.INTEGRATION_STEP,
+            impulse=so_far.impulse + torque * context.torque_duration,
         )
         ended = so_far.overspeed
         so_far = jax.tree.map(lambda old, new: jnp.where(ended, old, new), so_far, updated)
@@ -130,11 +130,14 @@ def record(
     controller: Controller, env: AttitudeEnv, params: EnvParams, start: EnvState, steps: int
 ) -> History:
     """Fly slews from a batch of states without ending them early, and keep every step."""
+    held = env.spacecraft.torque_held
 
     def step(state, _):
         observation = jax.vmap(observations.observe)(state.quaternion, state.angular_velocity)
         action = jax.vmap(controller, (0, None))(observation, env.context(params))
-        state = jax.vmap(spacecraft.step, (0, 0, None, None))(state, action, params, env.frameskip)
+        state = jax.vmap(
+            lambda state, action: spacecraft.step(state, action, params, env.frameskip, held)
+        )(state, action)
         return state, History(state.quaternion, state.angular_velocity, params.torque_table[action])
 
     return jax.lax.scan(step, start, length=steps)[1]
@@ -185,10 +188,11 @@ def time_optimal_reference(quaternion: chex.Array, context: Context) -> chex.Arr
     """Rest-to-rest time of a (4,) slew with decoupled axes, T = 2 √(Σ|θᵢ|Iᵢ/U), s.
 
     U is the largest torque averaged over a control period. An estimate and no bound: turning
-    about other axes than the eigenaxis can be about a tenth quicker. For diagonal inertia.
+    about other axes than the eigenaxis can be about a tenth quicker.
     """
-    angle = jnp.abs(quaternions.rotation_vector(quaternion))
-    return 2 * jnp.sqrt(jnp.sum(angle * context.inertia) / average_torque(context))
+    angle = quaternions.rotation_vector(quaternion)
+    momentum = jnp.abs(rigid_body.angular_momentum(context.inertia, angle))
+    return 2 * jnp.sqrt(jnp.sum(momentum) / average_torque(context))
 
 
 def summarize(x: np.ndarray) -> dict:

@@ -197,6 +197,8 @@ def rate_mask_constants(context: Context, margin: float) -> tuple[chex.Array, ..
     """
     form = rigid_body.peak_rate_form(context.inertia)
     at_rest = jnp.zeros(3, context.inertia.dtype)
-    impulse = dynamics.rate_after_impulse(at_rest, context.torque_table, context.inertia)
+    impulse = dynamics.rate_after_impulse(
+        at_rest, context.torque_table, context.inertia, context.torque_duration
+    )
     own_gain = jnp.sum(jnp.matmul(impulse, form, precision="highest") * impulse, axis=-1)
     return form, impulse, own_gain, (margin * context.rate_limit) ** 2

@@ -10,20 +10,7 @@ from flax import struct
 
 from attjax import checks, dynamics
 from attjax import quaternion as quaternions
-
-EPISODE_RK4_STEPS = 10_500
-"""RK4 steps in an episode of 43.75 s: 500 actions at frameskip 20, 1,750 at 5."""
-
-TORQUE_TABLE = np.concatenate(
-    [np.zeros((1, 3))]
-    + [
-        magnitude * sign * np.eye(3)[[axis]]
-        for magnitude in (0.5, 0.05, 0.005)
-        for axis in range(3)
-        for sign in (1, -1)
-    ]
-)
-"""Table 1: (19, 3) torque of each action, N m, body frame."""
+from attjax.specification import LM50, Spacecraft
 
 
 @struct.dataclass
@@ -52,7 +39,7 @@ class EnvParams:
         goal_angle: largest φ that counts as pointing, rad.
         min_slew_angle, max_slew_angle: range of the initial φ, rad.
         max_steps_in_episode: time limit, agent steps, int32.
-        frameskip: torque-free RK4 steps in an agent step, int32, where spacecraft of one batch
+        frameskip: RK4 steps after the first in an agent step, int32, where spacecraft of one batch
             differ; at most the environment's. None: the environment's.
     """
 
@@ -66,22 +53,18 @@ class EnvParams:
     frameskip: chex.Array | None = None
 
 
-def default_params(frameskip: int = 20) -> EnvParams:
-    """The paper's spacecraft and task, in JAX's default floating-point type."""
+def default_params(frameskip: int = 20, spacecraft: Spacecraft = LM50) -> EnvParams:
+    """A spacecraft and its task, by default the paper's, in JAX's default floating-point type."""
+    low, high = np.deg2rad(spacecraft.slew_angles_deg)
     return EnvParams(
-        inertia=jnp.array(dynamics.LM50_INERTIA, float),
-        torque_table=jnp.array(TORQUE_TABLE, float),
-        rate_limit=jnp.array(0.5, float),
-        goal_angle=jnp.array(np.deg2rad(0.25), float),
-        min_slew_angle=jnp.array(np.deg2rad(30), float),
-        max_slew_angle=jnp.array(np.deg2rad(150), float),
-        max_steps_in_episode=jnp.array(max_steps(frameskip), jnp.int32),
+        inertia=jnp.array(spacecraft.inertia, float),
+        torque_table=jnp.array(spacecraft.torque_table, float),
+        rate_limit=jnp.array(spacecraft.rate_limit, float),
+        goal_angle=jnp.array(np.deg2rad(spacecraft.goal_angle_deg), float),
+        min_slew_angle=jnp.array(low, float),
+        max_slew_angle=jnp.array(high, float),
+        max_steps_in_episode=jnp.array(spacecraft.max_steps(frameskip), jnp.int32),
     )
-
-
-def max_steps(frameskip: int) -> int:
-    """Agent steps in an episode of 43.75 s."""
-    return EPISODE_RK4_STEPS // (frameskip + 1)
 
 
 def check_params(params: EnvParams, frameskip: int) -> None:
@@ -155,15 +138,22 @@ def _direction(u):
     return jnp.stack([sine * jnp.cos(azimuth), sine * jnp.sin(azimuth), cosine])
 
 
-def step(state: EnvState, action, params: EnvParams | None = None, frameskip: int = 20) -> EnvState:
+def step(
+    state: EnvState,
+    action,
+    params: EnvParams | None = None,
+    frameskip: int = 20,
+    torque_held: bool = False,
+) -> EnvState:
     """One agent step of one spacecraft: pure, keyless, without reset or end of episode.
 
     Args:
         state: the spacecraft before the step.
         action: integer scalar, row of the torque table (Table 1).
         params: spacecraft, the paper's by default.
-        frameskip: torque-free RK4 steps after the one with torque (static); if
-            ``params.frameskip`` says how many, the most there may be.
+        frameskip: RK4 steps after the first (static); if ``params.frameskip`` says how many, the
+            most there may be.
+        torque_held: whether the torque lasts through all of them, or only the first (static).
 
     Returns:
         The state (1 + frameskip)/240 s later.
@@ -187,5 +177,6 @@ def step(state: EnvState, action, params: EnvParams | None = None, frameskip: in
         params.inertia,
         frameskip,
         params.frameskip,
+        torque_held,
     )
     return EnvState(quaternion, angular_velocity, state.time + 1)

@@ -9,6 +9,7 @@ import attjax
 from attjax import AttitudeEnv, spacecraft
 from attjax.dynamics import INTEGRATION_STEP
 from attjax.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
+from attjax.specification import LM50
 
 FRAMESKIP = 20
 TOLERANCE = 1e-5
@@ -53,7 +54,7 @@ def _aligned(shape, kind):
 
 def random_actions(steps: int, size: int, seed: int = 0) -> np.ndarray:
     """(steps, size) rows of Table 1, int32."""
-    actions = len(spacecraft.TORQUE_TABLE)
+    actions = LM50.num_actions
     return np.random.default_rng(seed).integers(0, actions, (steps, size), INTEGER)
 
 

@@ -5,11 +5,12 @@ import math
 import numpy as np
 
 from attjax import spacecraft
-from attjax.dynamics import LM50_INERTIA
 from attjax.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
+from attjax.specification import LM50
 
 FRAMESKIP = 20
-INERTIA = np.array(LM50_INERTIA)
+INERTIA = np.array(LM50.inertia)
+TORQUES = np.array(LM50.torque_table)
 PARAMS = spacecraft.default_params(FRAMESKIP)
 RATE_LIMIT, GOAL_ANGLE = float(PARAMS.rate_limit), float(PARAMS.goal_angle)
 MAX_STEPS = int(PARAMS.max_steps_in_episode)
@@ -39,7 +40,7 @@ class SingleSlew:
     def step(self, action: int):
         """One agent step. Returns observation, reward, terminated, truncated and {}."""
         before = self.quaternion[3]
-        self._propagate(spacecraft.TORQUE_TABLE[action])
+        self._propagate(TORQUES[action])
         self.time += 1
         terminated = math.sqrt(self.angular_velocity @ self.angular_velocity) > RATE_LIMIT
         truncated = not terminated and self.time >= MAX_STEPS

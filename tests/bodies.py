@@ -4,9 +4,9 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from attjax import dynamics
+from attjax import specification
 
-LM50 = np.array(dynamics.LM50_INERTIA)
+LM50 = np.array(specification.LM50.inertia)
 
 
 def rotated_inertia():

@@ -138,6 +138,17 @@ def test_propagate_is_an_impulse_and_free_steps(x64, frameskip):
 
 
 @pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
+@pytest.mark.parametrize("frameskip, steps_after", [(0, None), (20, None), (20, 7), (20, 0)])
+def test_a_held_torque_lasts_the_whole_agent_step(x64, inertia, frameskip, steps_after):
+    torque = np.array([0.02, -0.05, 0.01])
+    arguments = [jnp.asarray(x)[None] for x in (START[:4], START[4:], torque)]
+    propagate = jax.vmap(lambda *x: dynamics.propagate(*x, inertia, frameskip, steps_after, True))
+    ours = np.concatenate([x[0] for x in propagate(*arguments)])
+    steps = 1 + (frameskip if steps_after is None else steps_after)
+    np.testing.assert_allclose(ours, reference(START, steps / 240, torque, inertia), atol=1e-11)
+
+
+@pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
 def test_rate_after_impulse_is_the_integrated_one_to_first_order(x64, inertia):
     torques = np.array([[0.5, 0, 0], [0, -0.05, 0], [0, 0, 0]])
     predicted = dynamics.rate_after_impulse(START[4:], jnp.asarray(torques), jnp.asarray(inertia))
@@ -195,14 +206,14 @@ def test_wrong_shapes_and_mixed_types_are_refused():
 
 
 @pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
-@pytest.mark.parametrize("frameskip", [0, 5, 45])
-def test_the_loops_for_cpu_do_as_the_plain_scan(x64, inertia, frameskip):
+@pytest.mark.parametrize("kind", [(0, False), (5, False), (5, True), (45, False)])
+def test_the_loops_for_cpu_do_as_the_plain_scan(x64, inertia, kind):
     """Up to rounding: the compiler contracts products and sums differently."""
     gyroscopic, acceleration = dynamics._euler_terms(jnp.asarray(inertia, float), jnp.ones(3))
     quaternion, rate, _ = random_spacecraft(37)
     start = (*quaternion.T, *rate.T)
     plain, in_line = (
-        jax.jit(jax.vmap(functools.partial(change, frameskip), (0, None, None, None)))(
+        jax.jit(jax.vmap(functools.partial(change, kind), (0, None, None, None)))(
             start, acceleration, gyroscopic, ()
         )
         for change in (dynamics._change_by_scan, dynamics._change_in_line)

@@ -8,8 +8,8 @@ from pathlib import Path
 import attjax
 
 LAYERS = [
-    {"settings", "checks", "context", "spaces", "kernel", "vector", "sb3"},
-    {"programs"},
+    {"settings", "specification", "checks", "spaces", "kernel", "vector", "sb3"},
+    {"programs", "context"},
     {"quaternion", "rigid_body"},
     {"dynamics"},
     {"spacecraft", "reward", "observation"},

@@ -6,6 +6,7 @@ import pytest
 import attjax
 from attjax import quaternion as quaternions
 from attjax import spacecraft
+from attjax.specification import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -17,7 +18,7 @@ def states(n, seed=0):
 
 
 def test_torques_are_table_1():
-    assert spacecraft.TORQUE_TABLE.shape == (19, 3)
+    assert LM50.num_actions == 19
     expected = [[0, 0, 0]]
     for magnitude in (0.5, 0.05, 0.005):
         for axis in range(3):
@@ -25,7 +26,7 @@ def test_torques_are_table_1():
                 row = [0.0, 0.0, 0.0]
                 row[axis] = sign * magnitude
                 expected.append(row)
-    np.testing.assert_array_equal(spacecraft.TORQUE_TABLE, expected)
+    np.testing.assert_array_equal(LM50.torque_table, expected)
 
 
 def test_initial_slews_are_uniform_in_angle_and_axis():
@@ -98,7 +99,7 @@ def test_step_vmapped_equals_single_steps():
 def test_each_action_kicks_its_axis():
     rest = attjax.EnvState(jnp.array([0.0, 0, 0, 1]), jnp.zeros(3), jnp.int32(0))
     after = jax.jit(jax.vmap(attjax.step, (None, 0)))(rest, jnp.arange(19))
-    expected = spacecraft.TORQUE_TABLE / 240 / np.array([0.872, 0.115, 0.797])
+    expected = np.array(LM50.torque_table) / 240 / np.array([0.872, 0.115, 0.797])
     np.testing.assert_allclose(after.angular_velocity, expected, rtol=1e-5, atol=1e-9)
 
 

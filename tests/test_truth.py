@@ -15,18 +15,19 @@ from scipy.special import ellipj, ellipk
 from test_dynamics import START, reference
 
 import attjax
-from attjax import dynamics, quaternion, spacecraft
+from attjax import dynamics, quaternion, spacecraft, specification
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
+TORQUE_TABLE = np.array(specification.LM50.torque_table)
 BODIES = (LM50, rotated_inertia())
 BOTH_BODIES = pytest.mark.parametrize("inertia", BODIES, ids=["diagonal", "full"])
 
 
 def random_actions(frameskip, *shape):
     """Actions of whole episodes, (steps, *shape)."""
-    steps = spacecraft.max_steps(frameskip)
-    return np.random.default_rng(1).integers(0, len(spacecraft.TORQUE_TABLE), (steps, *shape))
+    steps = specification.LM50.max_steps(frameskip)
+    return np.random.default_rng(1).integers(0, len(TORQUE_TABLE), (steps, *shape))
 
 
 def flight(start, actions, inertia, frameskip):
@@ -84,7 +85,7 @@ def test_flies_as_basilisk(x64, body):
 def test_an_episode_agrees_with_dop853(x64, inertia):
     """43.75 s, 500 random actions, each pulse and each coast integrated apart."""
     actions, exact = random_actions(20), START
-    for torque in spacecraft.TORQUE_TABLE[actions]:
+    for torque in TORQUE_TABLE[actions]:
         exact = reference(reference(exact, 1 / 240, torque, inertia), 20 / 240, inertia=inertia)
     ours = flight(START, actions, inertia, 20)[-1]
     np.testing.assert_allclose(ours[:4], exact[:4], rtol=0, atol=1e-11)  # 1.4e-12
@@ -133,7 +134,7 @@ def test_torque_accounts_for_energy_and_inertial_momentum(x64, inertia):
     """ΔT = ∫ ω·M dt and ΔH = ∫ R M dt over an episode, by Simpson's rule over each pulse."""
     tensor = np.diag(inertia) if inertia.ndim == 1 else inertia
     actions = random_actions(20)
-    torques = spacecraft.TORQUE_TABLE[actions]
+    torques = TORQUE_TABLE[actions]
     states = np.asarray(flight(START, actions, inertia, 20))
     before = [jnp.asarray(x) for x in (states[:-1, :4], states[:-1, 4:], torques, inertia)]
     later = jax.vmap(dynamics.rk4_step, (0, 0, 0, None, None))

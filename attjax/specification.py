@@ -1,0 +1,184 @@
+"""A spacecraft and its task, as a user describes them; LM50, the paper's.
+
+This module imports nothing heavy, so that errors in a description are instant.
+"""
+
+import dataclasses
+import math
+
+INTEGRATION_STEP = 1 / 240
+"""Length of one RK4 step, s (paper, section 2.3)."""
+
+LEAST_MOMENT, MOST_MOMENT = 1e-9, 1e9
+MOST_ACTIONS = 1000
+MOST_RK4_STEPS = 10**7
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Spacecraft:
+    """A spacecraft and the slews that it is to fly; by default LM50 and the paper's.
+
+    Attributes:
+        name: for people.
+        inertia: three principal moments along the body axes, or three rows of a symmetric tensor
+            in the body frame, kg m².
+        torque_levels: magnitudes of torque about each axis, in both directions, N m.
+        torque_axes: directions of these torques in the body frame; they are normalised.
+        torque_held: whether a torque lasts the whole control period, as of reaction wheels, or
+            1/240 s at its beginning, as in the paper.
+        rate_limit: ‖ω‖ that ends an episode when exceeded, rad/s.
+        goal_angle_deg: largest error angle that counts as pointing, degrees.
+        slew_angles_deg: least and largest initial error angle, degrees.
+        duration: of an episode, s.
+
+    Raises:
+        ValueError: a value is not as said, or no rigid body has that inertia.
+
+    Example:
+        >>> Spacecraft(inertia=(0.05, 0.14, 0.17), torque_levels=(0.002,)).num_actions
+        7
+        >>> Spacecraft(inertia=(1, 1, 3))
+        Traceback (most recent call last):
+        ValueError: inertia has principal moments 1, 1, 3; none may exceed the other two together
+    """
+
+    name: str = "LM50"
+    inertia: tuple = (0.872, 0.115, 0.797)
+    torque_levels: tuple[float, ...] = (0.5, 0.05, 0.005)
+    torque_axes: tuple[tuple[float, ...], ...] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    torque_held: bool = False
+    rate_limit: float = 0.5
+    goal_angle_deg: float = 0.25
+    slew_angles_deg: tuple[float, ...] = (30, 150)
+    duration: float = 43.75
+
+    def __post_init__(self):
+        if not isinstance(self.name, str) or not self.name.isprintable() or not self.name:
+            raise ValueError(f"name is {self.name!r}; it must be a line of text")
+        if not isinstance(self.torque_held, bool):
+            raise ValueError(f"torque_held is {self.torque_held!r}; it must be true or false")
+        self._check_inertia()
+        _check_numbers("torque_levels", self.torque_levels, 1e-12, 1e6)
+        self._check_axes()
+        _check_number("rate_limit", self.rate_limit, 1e-6, 1e3)
+        _check_number("goal_angle_deg", self.goal_angle_deg, 1e-6, 180)
+        _check_numbers("slew_angles_deg", self.slew_angles_deg, 0, 180, count=2)
+        if self.slew_angles_deg[0] > self.slew_angles_deg[1]:
+            shown = _shown(self.slew_angles_deg)
+            raise ValueError(f"slew_angles_deg is {shown}; the first must be the least")
+        longest = MOST_RK4_STEPS * INTEGRATION_STEP
+        _check_number("duration", self.duration, INTEGRATION_STEP, longest)
+
+    def _check_inertia(self):
+        rows = self.inertia
+        if isinstance(rows, tuple) and len(rows) == 3 and isinstance(rows[0], tuple):
+            for row in rows:
+                _check_numbers("each row of inertia", row, count=3)
+            moments = _principal_moments(rows)
+        else:
+            _check_numbers("inertia", rows, count=3)
+            moments = sorted(rows)
+        shown = ", ".join(f"{x:g}" for x in moments)
+        if not LEAST_MOMENT <= moments[0] <= moments[2] <= MOST_MOMENT:
+            raise ValueError(
+                f"inertia has principal moments {shown}; "
+                f"they must be from {LEAST_MOMENT:g} to {MOST_MOMENT:g}"
+            )
+        if moments[2] > (moments[0] + moments[1]) * (1 + 1e-5):
+            raise ValueError(
+                f"inertia has principal moments {shown}; none may exceed the other two together"
+            )
+
+    def _check_axes(self):
+        axes = self.torque_axes
+        if not isinstance(axes, tuple) or not axes:
+            raise ValueError(f"torque_axes is {_shown(axes)}; it must be a list of [x, y, z]")
+        for axis in axes:
+            _check_numbers("each of torque_axes", axis, count=3)
+            if not any(axis):
+                raise ValueError(f"torque_axes holds {_shown(axis)}; it must be a direction")
+        if self.num_actions > MOST_ACTIONS:
+            raise ValueError(
+                f"torque_levels and torque_axes make {self.num_actions} actions; "
+                f"they must be at most {MOST_ACTIONS}"
+            )
+
+    @property
+    def num_actions(self) -> int:
+        """No torque, and each level about each axis in both directions."""
+        return 1 + 2 * len(self.torque_levels) * len(self.torque_axes)
+
+    @property
+    def torque_table(self) -> list[list[float]]:
+        """The torque of each action, N m, body frame, in the order of Table 1."""
+        axes = [[x / math.hypot(*axis) for x in axis] for axis in self.torque_axes]
+        signed = [
+            [sign * level * x for x in axis]
+            for level in self.torque_levels
+            for axis in axes
+            for sign in (1, -1)
+        ]
+        return [[0.0, 0.0, 0.0], *signed]
+
+    def max_steps(self, frameskip: int) -> int:
+        """Whole agent steps in an episode, for that many RK4 steps after the first in each."""
+        return int(self.duration / INTEGRATION_STEP + 1e-6) // (frameskip + 1)
+
+
+def from_lists(values: dict) -> Spacecraft:
+    """A spacecraft from what TOML or JSON make of its values, lists for tuples.
+
+    Raises:
+        ValueError: a name is unknown, or a value is not as :class:`Spacecraft` says.
+    """
+    names = [field.name for field in dataclasses.fields(Spacecraft)]
+    unknown = sorted(set(values) - set(names))
+    if unknown:
+        raise ValueError(f"{unknown[0]} is unknown; there are {', '.join(names)}")
+    return Spacecraft(**{name: _tuples(value) for name, value in values.items()})
+
+
+def _tuples(value):
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+def _check_number(name, x, low, high):
+    if not _is_number(x):
+        raise ValueError(f"{name} is {_shown(x)}; it must be a number")
+    if not low <= x <= high:
+        raise ValueError(f"{name} is {x}; it must be from {low:g} to {high:g}")
+
+
+def _check_numbers(name, values, low=-math.inf, high=math.inf, count=None):
+    is_tuple = isinstance(values, tuple) and values and count in (None, len(values))
+    if not is_tuple or not all(map(_is_number, values)):
+        listed = "a list of numbers" if count is None else f"{count} numbers"
+        raise ValueError(f"{name} is {_shown(values)}; it must be {listed}")
+    if not all(low <= x <= high and math.isfinite(x) for x in values):
+        allowed = "finite" if math.isinf(high) else f"from {low:g} to {high:g}"
+        raise ValueError(f"{name} is {_shown(values)}; they must be {allowed}")
+
+
+def _is_number(x):
+    return isinstance(x, int | float) and not isinstance(x, bool)
+
+
+def _shown(values):
+    """As in the user's file."""
+    if not isinstance(values, tuple):
+        return repr(values)
+    return f"[{', '.join(map(_shown, values))}]"
+
+
+def _principal_moments(rows):
+    """The sorted eigenvalues of a symmetric tensor."""
+    import numpy as np  # imported late: the usual inertia is three moments
+
+    tensor = np.array(rows, float)
+    if not np.allclose(tensor, tensor.T, rtol=0, atol=1e-5 * np.max(np.abs(tensor))):
+        raise ValueError(f"inertia is {_shown(rows)}; it must be symmetric")
+    return np.linalg.eigvalsh(tensor).tolist()
+
+
+LM50 = Spacecraft()
+"""The paper's."""
