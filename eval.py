@@ -7,12 +7,14 @@ Example:
     python eval.py --checkpoint ckpt/ --compare
 """
 
+import dataclasses
 import json
 import sys
 import time
 from pathlib import Path
 
-from attjax import cli, run_folder
+from attjax import cli, config_file, run_folder
+from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
 
 POLICY = "policy"
 CLASSICAL = ("phase-plane", "feedback")
@@ -31,9 +33,15 @@ def parse_arguments(argv):
     best_help = "the checkpoint with the least terminal error in training, not the newest"
     parser.add_argument("--best", action="store_true", help=best_help)
     cli.add_number(parser, "episodes", int, 5000, "number of slews", low=1, high=10**7)
-    frameskip_help = "torque-free RK4 steps after an impulse; the control rate is 240/(N + 1) Hz"
+    frameskip_help = "RK4 steps after the first of a decision; the control rate is 240/(N + 1) Hz"
     cli.add_number(parser, "frameskip", int, 5, frameskip_help, low=0, below=10_500)
-    cli.add_number(parser, "duration", float, 43.75, "length of an episode, s", above=0, high=1e6)
+    craft_help = (
+        "TOML file of the spacecraft that flies (default: the one that the policy was trained on; "
+        "LM50 for a classical controller)"
+    )
+    parser.add_argument("--spacecraft", type=Path, metavar="FILE", help=craft_help)
+    duration_help = "length of an episode, s (default: the spacecraft's; LM50's is 43.75)"
+    cli.add_number(parser, "duration", float, None, duration_help, above=0, high=MOST_DURATION)
     plot_help = "also draw figures into this folder (needs the extra plot)"
     parser.add_argument("--plot", type=Path, metavar="FOLDER", help=plot_help)
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the statistics here")
@@ -46,25 +54,24 @@ def main(argv=None) -> int:
     advice = "fewer --episodes take less"
     with cli.one_line_errors("eval.py", run_folder.FolderError), cli.enough_memory(advice):
         cli.select_device(arguments.device)
-        steps = _episode_steps(arguments.duration, arguments.frameskip)
         names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
-        controllers = {name: _controller(name, arguments) for name in names}
+        spacecraft = _spacecraft(arguments, names)
+        controllers = {name: _controller(name, arguments, spacecraft) for name in names}
         _check_writable(arguments.json)
         plots = _prepare_plots(arguments.plot)
         metrics = _metrics(arguments.checkpoint) if plots and POLICY in controllers else []
-        return _evaluate(arguments, controllers, steps, plots, metrics)
+        return _evaluate(arguments, controllers, spacecraft, plots, metrics)
 
 
-def _evaluate(arguments, controllers, steps, plots, metrics):
+def _evaluate(arguments, controllers, spacecraft, plots, metrics):
     """Fly, print, draw and write."""
     # Imported late: with them, --help and errors in the arguments would take seconds.
     import jax
-    import jax.numpy as jnp
 
     from attjax import AttitudeEnv, evaluation, report
 
-    env = AttitudeEnv(arguments.frameskip)
-    params = env.default_params.replace(max_steps_in_episode=jnp.array(steps, jnp.int32))
+    env = AttitudeEnv(arguments.frameskip, spacecraft=spacecraft)
+    params = env.default_params
     start = time.monotonic()
     seed, results = arguments.seed or 0, []
     conditions = evaluation.conditions(env, params, seed, arguments.episodes)
@@ -78,9 +85,9 @@ def _evaluate(arguments, controllers, steps, plots, metrics):
             for path in plots.write_all(flight, folder, metrics if name == POLICY else []):
                 print(f"wrote {path}")
     if arguments.compare:
-        report.print_comparison(results)
+        report.print_comparison(results, spacecraft)
     else:
-        report.print_report(results[0])
+        report.print_report(results[0], spacecraft)
     print(f"evaluated in {time.monotonic() - start:.1f} s, compilation included")
     if arguments.json:
         content = {"controllers": results} if arguments.compare else results[0]
@@ -111,26 +118,39 @@ def _prepare_plots(folder):
     return plots
 
 
-def _controller(name, arguments):
+def _spacecraft(arguments, names):
+    """What flies, with the duration that was asked for."""
+    if arguments.spacecraft is not None:
+        spacecraft = config_file.read_spacecraft(arguments.spacecraft)
+    elif POLICY in names:
+        spacecraft = run_folder.read_config(arguments.checkpoint).spacecraft
+    else:
+        spacecraft = LM50
+    duration = spacecraft.duration if arguments.duration is None else arguments.duration
+    period = (arguments.frameskip + 1) * INTEGRATION_STEP
+    if duration < period * (1 - 1e-6):
+        raise cli.UserError(
+            f"--duration is {duration} s; it must hold at least one agent step of {period:.4g} s"
+        )
+    return dataclasses.replace(spacecraft, duration=duration)
+
+
+def _controller(name, arguments, spacecraft):
     import jax
 
     from attjax import checkpoint, controllers
 
-    if name == POLICY:
-        update = checkpoint.best(arguments.checkpoint) if arguments.best else None
-        return checkpoint.restore_policy(arguments.checkpoint, update)
-    return jax.tree_util.Partial(controllers.CONTROLLERS[name])
-
-
-def _episode_steps(duration, frameskip):
-    """Whole agent steps in the duration; 43.75 s at frameskip 5 are 1,750."""
-    steps = int(duration * 240 / (frameskip + 1) + 1e-6)
-    if not 1 <= steps < 2**31:
+    if name != POLICY:
+        return jax.tree_util.Partial(controllers.CONTROLLERS[name])
+    folder = arguments.checkpoint
+    update = checkpoint.best(folder) if arguments.best else None
+    trained_on = run_folder.read_config(folder).spacecraft
+    if trained_on.num_actions != spacecraft.num_actions:
         raise cli.UserError(
-            f"--duration is {duration} s; it must hold at least one agent step of "
-            f"{(frameskip + 1) / 240:.4g} s, and fewer than 2^31"
+            f"{arguments.spacecraft} has {spacecraft.num_actions} actions; the policy in {folder} "
+            f"chooses among {trained_on.num_actions}"
         )
-    return steps
+    return checkpoint.restore_policy(folder, update)
 
 
 def _check_writable(path):

@@ -68,7 +68,8 @@ def _flight_policy(arguments):
     policy, params = checkpoint.restore_network(folder, update)
     origin = f"preset {config.preset}, seed {config.seed}, update {update}"
     try:
-        return FlightPolicy(policy, params, AttitudeEnv(arguments.frameskip), origin)
+        env = AttitudeEnv(arguments.frameskip, spacecraft=config.spacecraft)
+        return FlightPolicy(policy, params, env, origin)
     except ValueError as error:
         raise cli.UserError(f"{folder} cannot be exported: {error}") from None
 

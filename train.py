@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from attjax import cli, config_file, presets, run_folder
+from attjax.specification import LM50
 
 DEFAULT_PRESET = "precise"
 
@@ -24,11 +25,13 @@ def parse_arguments(argv):
     resume_help = "continue the folder's run, or start it if there is none"
     existing.add_argument("--resume", action="store_true", help=resume_help)
     existing.add_argument("--overwrite", action="store_true", help="replace the folder's run")
+    craft_help = "TOML file that describes the spacecraft and its task (default: LM50, the paper's)"
+    parser.add_argument("--spacecraft", type=Path, metavar="FILE", help=craft_help)
     save_help = "seconds between two checkpoints"
     cli.add_number(parser, "save-every", float, 30.0, save_help, low=0)
     debug_help = "check every operation, and name the first that makes a NaN (slow)"
     parser.add_argument("--debug-nans", action="store_true", help=debug_help)
-    config_help = "TOML file with preset, seed and [settings]; flags override it"
+    config_help = "TOML file with preset, seed, [settings] and [spacecraft]; flags override it"
     parser.add_argument("--config", type=Path, metavar="FILE", help=config_help)
     print_help = "print the file that reproduces this run, and end"
     parser.add_argument("--print-config", action="store_true", help=print_help)
@@ -60,21 +63,26 @@ def _given(arguments):
     for name in ("preset", "seed"):
         if getattr(arguments, name) is not None:
             given[name] = getattr(arguments, name)
+    if arguments.spacecraft is not None:
+        given["spacecraft"] = config_file.read_spacecraft(arguments.spacecraft)
     return given | cli.overrides(arguments)
 
 
-def _new_config(preset=DEFAULT_PRESET, seed=0, **settings):
-    return run_folder.Config(preset, seed, dataclasses.replace(presets.PRESETS[preset], **settings))
+def _new_config(preset=DEFAULT_PRESET, seed=0, spacecraft=LM50, **settings):
+    settings = dataclasses.replace(presets.PRESETS[preset], **settings)
+    return run_folder.Config(preset, seed, settings, spacecraft)
 
 
 def _open(arguments, given, new, stop):
     """The folder's run, new or continued."""
     # Imported late: with it, --help and errors in the arguments would take seconds.
-    from attjax import training
+    from attjax import assembly, training
 
     folder = arguments.checkpoint
     resumes = arguments.resume and run_folder.holds_run(folder)
     if not resumes:
+        # A user's function that cannot be used fails here, before a run gives way to this one.
+        assembly.setup(new.settings, new.spacecraft)
         run_folder.create(folder, new, arguments.overwrite)
         run = training.Run(folder, new, stop)
     else:

@@ -1,16 +1,18 @@
 """From settings to the objects that they describe."""
 
+import functools
 import math
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import learner, spacecraft
+from attjax import learner, spacecraft, user_functions
 from attjax.env import AttitudeEnv
-from attjax.networks import Policy
+from attjax.networks import FEATURES, Policy
 from attjax.reward import REWARDS
 from attjax.settings import Settings
+from attjax.specification import LM50, Spacecraft
 
 MAX_DEVICES = 8
 """Most devices of a run, a power of two as their number is."""
@@ -19,24 +21,49 @@ MIN_SAMPLES = 512
 """Samples of a minibatch on a device below which sharing it out costs more than it gains."""
 
 
-def policy(settings: Settings) -> Policy:
-    """The policy, without parameters."""
-    return Policy(
-        features=settings.features,
-        hidden_sizes=settings.hidden_sizes,
-        rate_margin=settings.rate_margin,
-    )
+def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
+    """The policy for a spacecraft, without parameters.
+
+    Raises:
+        FunctionError: the features are a user's function that cannot be used.
+    """
+    features = settings.features
+    if features not in FEATURES:
+        features = user_functions.resolve(features, FEATURES)
+        call = functools.partial(
+            jax.eval_shape, features, *_first_sight(AttitudeEnv(0, spacecraft=craft))
+        )
+        user_functions.check(f"features {settings.features}", call, rank=1)
+    return Policy(features, settings.hidden_sizes, craft.num_actions, settings.rate_margin)
 
 
-def setup(settings: Settings, num_devices: int = 1) -> learner.Setup:
-    """Environment, policy and settings of a training run."""
-    reward = REWARDS[settings.reward]
+def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) -> learner.Setup:
+    """Environment, policy and settings of a training run.
+
+    Raises:
+        FunctionError: the reward or the features are a user's function that cannot be used.
+    """
+    reward = user_functions.resolve(settings.reward, REWARDS)
     start = spacecraft.initial_state
     if settings.near_goal_share > 0:
         start = spacecraft.NearGoalStarts(settings.near_goal_share, settings.near_goal_steps)
-    env = AttitudeEnv(max(settings.frameskips), reward, start)
+    env = AttitudeEnv(max(settings.frameskips), reward, start, craft)
+    if settings.reward not in REWARDS:
+        call = functools.partial(jax.eval_shape, functools.partial(_first_reward, env))
+        user_functions.check(f"reward {settings.reward}", call, rank=0)
     groups = len(settings.frameskips)
-    return learner.Setup(env, policy(settings), settings, groups, num_devices)
+    return learner.Setup(env, policy(settings, craft), settings, groups, num_devices)
+
+
+def _first_reward(env):
+    params, key = env.default_params, jax.random.key(0)
+    return env.step_env(key, env.reset(key, params)[1], 0, params)[2]
+
+
+def _first_sight(env):
+    """An observation and a context, as features have them."""
+    params = env.default_params
+    return env.reset(jax.random.key(0), params)[0], env.context(params)
 
 
 def num_devices(settings: Settings) -> int:
@@ -47,12 +74,13 @@ def num_devices(settings: Settings) -> int:
 
 
 def env_params(setup: learner.Setup) -> spacecraft.EnvParams:
-    """The paper's parameters, but for the cap on the episode's length.
+    """The spacecraft's parameters, but for the cap on the episode's length.
 
     With several control rates, each group of spacecraft has its own.
     """
     settings, params = setup.settings, setup.env.default_params
-    limits = [spacecraft.max_steps(frameskip) for frameskip in settings.frameskips]
+    craft = setup.env.spacecraft
+    limits = [craft.max_steps(frameskip) for frameskip in settings.frameskips]
     limits = np.minimum(limits, settings.max_episode_steps).astype(np.int32)
     if setup.groups == 1:
         return params.replace(max_steps_in_episode=jnp.asarray(limits[0]))
@@ -63,9 +91,7 @@ def env_params(setup: learner.Setup) -> spacecraft.EnvParams:
     )
 
 
-def initial_parameters(policy: Policy) -> dict:
-    """Parameters of the right shapes for a policy on the attitude environment."""
-    env = AttitudeEnv()
-    params = env.default_params
-    observation, _ = env.reset(jax.random.key(0), params)
-    return policy.init(jax.random.key(0), jax.random.key(1), observation, env.context(params))
+def initial_parameters(policy: Policy, craft: Spacecraft = LM50) -> dict:
+    """Parameters of the right shapes for a policy that flies the spacecraft."""
+    sight = _first_sight(AttitudeEnv(frameskip=0, spacecraft=craft))
+    return policy.init(jax.random.key(0), jax.random.key(1), *sight)

@@ -159,8 +159,10 @@ def restore_network(folder: Path, update: int | None = None) -> tuple[Policy, di
     Raises:
         FolderError: as :func:`restore_policy`.
     """
-    policy = assembly.policy(run_folder.read_config(folder).settings)
-    template = jax.eval_shape(functools.partial(assembly.initial_parameters, policy))["policy"]
+    config = run_folder.read_config(folder)
+    policy = assembly.policy(config.settings, config.spacecraft)
+    initial = functools.partial(assembly.initial_parameters, policy, config.spacecraft)
+    template = jax.eval_shape(initial)["policy"]
     params = _restore(folder, latest(folder) if update is None else update, "policy", template)
     return policy, {"policy": params}
 

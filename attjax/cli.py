@@ -9,7 +9,7 @@ import signal
 import sys
 from pathlib import Path
 
-from attjax import presets, settings
+from attjax import presets, settings, user_functions
 
 DEVICES = ("auto", "cpu", "gpu")
 BAD_INPUT = 2
@@ -37,7 +37,7 @@ def one_line_errors(prog: str, *kinds: type[Exception]):
     """Turn exceptions of these kinds into one line on stderr and exit status 2."""
     try:
         yield
-    except (UserError, *kinds) as error:
+    except (UserError, user_functions.FunctionError, *kinds) as error:
         _fail(prog, error)
 
 

@@ -1,13 +1,15 @@
 """TOML files that describe a training run: ``--config`` and ``--print-config``."""
 
+import contextlib
 import dataclasses
 import json
 import tomllib
 from pathlib import Path
 
-from attjax import presets, settings
+from attjax import presets, settings, specification
 from attjax.cli import UserError
 from attjax.run_folder import Config
+from attjax.specification import Spacecraft
 
 SETTINGS = {field.name: field for field in dataclasses.fields(settings.Settings)}
 OTHERS = (
@@ -18,17 +20,14 @@ FIELDS = SETTINGS | {field.name: field for field in OTHERS}
 
 
 def read(path: Path) -> dict:
-    """The preset, the seed and the settings that a file gives, by name; it need not give all.
+    """The preset, seed, settings and spacecraft that a file gives, by name; it need not give all.
 
     Raises:
         UserError: it cannot be read, or something in it is unknown or out of range.
     """
-    try:
-        content = tomllib.loads(path.read_text())
-    except OSError as error:
-        raise UserError(f"--config {path} cannot be read: {error.strerror}") from None
-    except ValueError as error:
-        raise UserError(f"--config {path} is no TOML: {error}") from None
+    with _one_line(f"--config {path}"):
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    spacecraft = content.pop("spacecraft", None)
     given = content.pop("settings", {})
     if not isinstance(given, dict):
         raise UserError(f"--config {path}: settings must be a table, [settings]")
@@ -36,12 +35,35 @@ def read(path: Path) -> dict:
     if unknown:
         raise UserError(f"--config {path} has unknown names: {', '.join(sorted(unknown))}")
     given = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
-    try:
-        for name, value in (content | given).items():
+    given |= content
+    with _one_line(f"--config {path}"):
+        for name, value in given.items():
             settings.check(FIELDS[name], value)
+        if spacecraft is not None:
+            given["spacecraft"] = specification.from_lists(spacecraft, specification.NEEDED)
+    return given
+
+
+def read_spacecraft(path: Path) -> Spacecraft:
+    """The spacecraft of ``--spacecraft``.
+
+    Raises:
+        UserError: the file cannot be read, or describes none.
+    """
+    with _one_line(f"--spacecraft {path}"):
+        return Spacecraft.from_toml(path)
+
+
+@contextlib.contextmanager
+def _one_line(what):
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{what} cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UserError(f"{what} is no TOML: {error}") from None
     except ValueError as error:
-        raise UserError(f"--config {path}: {error}") from None
-    return content | given
+        raise UserError(f"{what}: {error}") from None
 
 
 def text(config: Config) -> str:
@@ -54,6 +76,12 @@ def text(config: Config) -> str:
     lines = [f'preset = "{config.preset}"', f"seed = {config.seed}", "", "[settings]"]
     for name, field in SETTINGS.items():
         value = getattr(config.settings, name)
-        shown = json.dumps(list(value) if isinstance(value, tuple) else value)
-        lines += [f"# {field.metadata['help']}", f"{name} = {shown}"]
+        lines += [f"# {field.metadata['help']}", f"{name} = {_toml(value)}"]
+    lines += ["", "[spacecraft]", "# kg m², N m, rad/s, degrees and s; body frame"]
+    values = dataclasses.asdict(config.spacecraft)
+    lines += [f"{name} = {_toml(value)}" for name, value in values.items()]
     return "\n".join(lines) + "\n"
+
+
+def _toml(value):
+    return json.dumps(value, ensure_ascii=False)

@@ -1,6 +1,7 @@
 """Policy and value networks, and what they see."""
 
 import dataclasses
+from collections.abc import Callable
 
 import chex
 import flax.linen as nn
@@ -79,13 +80,14 @@ class Policy:
     """A categorical policy and its value function, two networks that share no parameters.
 
     Attributes:
-        features: "state", the observation as it is, or "multiscale".
+        features: "state", the observation as it is, "multiscale", or a function of an observation
+            (size,) and a context, to (features,).
         hidden_sizes: neurons of each hidden layer.
         num_actions: number of actions.
         rate_margin: the fraction of the rate limit that :func:`rate_mask` keeps; 0: no mask.
     """
 
-    features: str = "state"
+    features: str | Callable = "state"
     hidden_sizes: tuple[int, ...] = (400, 300)
     num_actions: int = 19
     rate_margin: float = 0.0
@@ -110,9 +112,7 @@ class Policy:
 
     def encode(self, observation: chex.Array, context: Context | None) -> Inputs:
         """Features and mask of one observation (size,); no parameters are involved."""
-        features = observation
-        if self.features == "multiscale":
-            features = multiscale_features(observation, context.control_period)
+        features = FEATURES.get(self.features, self.features)(observation, context)
         allowed = jnp.ones(self.num_actions, bool)
         if self.rate_margin > 0:
             allowed = rate_mask(observation, context, self.rate_margin)
@@ -138,7 +138,13 @@ class Policy:
         return jnp.argmax(self.log_probabilities(params, batch_of_one)[:, 0])
 
 
-def multiscale_features(observation: chex.Array, control_period: chex.Array) -> chex.Array:
+def state_features(observation: chex.Array, context: Context | None) -> chex.Array:
+    """The observation as it is."""
+    del context
+    return observation
+
+
+def multiscale_features(observation: chex.Array, context: Context) -> chex.Array:
     """tanh(k x) of the attitude and of ω for every k of SCALES.
 
     Near the goal the state is 1e-5 of what it is at the start; each scale resolves its own
@@ -149,11 +155,12 @@ def multiscale_features(observation: chex.Array, control_period: chex.Array) -> 
 
     Args:
         observation: (11,) Eq. 11.
-        control_period: scalar, s.
+        context: of which the control period counts.
 
     Returns:
         (57,) features.
     """
+    control_period = context.control_period
     observation = checks.real("observation", observation, (observations.SIZE,))
     quaternion = observation[observations.QUATERNION]
     attitude = quaternion[:3] * (FEATURE_PERIOD / control_period)
@@ -166,6 +173,9 @@ def multiscale_features(observation: chex.Array, control_period: chex.Array) -> 
     factors[6:, -3:] = np.eye(3)
     features = jnp.matmul(jnp.concatenate([scaled, plain]), factors, precision="highest")
     return jnp.where(np.any(factors[:6], axis=0), jnp.tanh(features), features)
+
+
+FEATURES = {"state": state_features, "multiscale": multiscale_features}
 
 
 def rate_mask(observation: chex.Array, context: Context, margin: float) -> chex.Array:

@@ -13,15 +13,13 @@ from attjax import evaluation
 from attjax import quaternion as quaternions
 from attjax.env import AttitudeEnv
 from attjax.evaluation import TABLE_5, Controller, Episodes
-from attjax.report import PAPER_TABLE_2
+from attjax.report import PAPER_TABLE_2, is_the_papers
 from attjax.spacecraft import EnvParams, EnvState
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-PULSES = (-0.5, -0.05, -0.005, 0, 0.005, 0.05, 0.5)
 STYLES = ("-", "--", "-.", ":")
-GOAL_DEG = 0.25
 RANDOM_SLEWS = 200
 FINAL_SECONDS = 8.0
 
@@ -55,6 +53,16 @@ class Flight:
         return f"{1 / self.env.control_period:.2f} Hz"
 
     @property
+    def is_the_papers(self) -> bool:
+        """Whether the paper's results can stand beside this flight's."""
+        return is_the_papers(self.env.spacecraft)
+
+    @property
+    def goal_deg(self) -> float:
+        """The largest error angle that counts as pointing, degrees."""
+        return self.env.spacecraft.goal_angle_deg
+
+    @property
     def starts(self) -> EnvState:
         """The initial states of the flown slews."""
         key, episodes = jax.random.key(self.seed), len(self.flown.overspeed)
@@ -86,7 +94,7 @@ def write_all(flight: Flight, folder: Path, metrics: list[dict]) -> list[Path]:
         settling(flight, folder),
     ]
     if metrics:
-        paths.append(learning_curve(metrics, folder))
+        paths.append(learning_curve(metrics, flight.is_the_papers, folder))
     return paths
 
 
@@ -99,12 +107,18 @@ def slews(flight: Flight, folder: Path) -> list[Path]:
         figure, axes = plt.subplots(4, 1, figsize=(7, 9), sharex=True, layout="constrained")
         _plot_components(axes[0], time, one.quaternion, ("q1", "q2", "q3", "q_s"))
         _plot_components(axes[2], time, one.angular_velocity, ("ω1", "ω2", "ω3"))
-        _plot_pulses(axes[3], time, one.torque)
+        _plot_pulses(axes[3], time, one.torque, flight.env.spacecraft)
         axes[1].semilogy(time, _angles_deg(one.quaternion), "k", linewidth=1)
-        axes[1].axhline(GOAL_DEG, color="0.5", linestyle=":", label="0.25°")
+        goal = flight.goal_deg
+        axes[1].axhline(goal, color="0.5", linestyle=":", label=f"{goal:g}°")
         axes[1].legend(loc="upper right", fontsize=8)
-        labels = ("error quaternion", "error angle φ (°)", "angular velocity (rad/s)")
-        for axis, label in zip(axes, (*labels, "torque pulses (N m)")):
+        labels = (
+            "error quaternion",
+            "error angle φ (°)",
+            "angular velocity (rad/s)",
+            "torque (N m)",
+        )
+        for axis, label in zip(axes, labels):
             axis.set_ylabel(label)
         axes[3].set_xlabel("time (s)")
         axes[0].set_title(f"Table 5, test {index + 1}, at {flight.hz}")
@@ -118,13 +132,15 @@ def _plot_components(axis, time, values, names):
     axis.legend(loc="upper right", ncols=4, fontsize=8)
 
 
-def _plot_pulses(axis, time, torque):
+def _plot_pulses(axis, time, torque, spacecraft):
+    levels = sorted(spacecraft.torque_levels)
     for values, name, marker in zip(torque.T, ("M1", "M2", "M3"), "xo+"):
         on = values != 0
         axis.plot(time[on], values[on], marker, markersize=3, label=name)
-    axis.set_yscale("symlog", linthresh=0.004)
-    axis.set_yticks(PULSES, [f"{pulse:g}" for pulse in PULSES])
-    axis.set_ylim(-1.5, 1.5)
+    axis.set_yscale("symlog", linthresh=0.8 * levels[0])
+    pulses = [sign * level for sign in (-1, 1) for level in levels]
+    axis.set_yticks([0, *pulses], [f"{pulse:g}" for pulse in (0, *pulses)])
+    axis.set_ylim(-3 * levels[-1], 3 * levels[-1])
     axis.legend(loc="upper right", ncols=4, fontsize=8)
 
 
@@ -156,7 +172,8 @@ def error_histories(flight: Flight, folder: Path) -> Path:
         axis.semilogy(
             time, np.quantile(angles, quantile, axis=1), "k" + style, label=f"{quantile:.0%}"
         )
-    axis.axhline(GOAL_DEG, color="tab:red", linestyle="-.", linewidth=1, label="0.25°")
+    goal = flight.goal_deg
+    axis.axhline(goal, color="tab:red", linestyle="-.", linewidth=1, label=f"{goal:g}°")
     axis.set_xlabel("time (s)")
     axis.set_ylabel("error angle φ (°)")
     axis.set_title(f"{angles.shape[1]} random slews at {flight.hz}, and quantiles")
@@ -165,13 +182,17 @@ def error_histories(flight: Flight, folder: Path) -> Path:
 
 
 def distributions(flight: Flight, folder: Path) -> Path:
-    """Cumulative distribution of the closest and terminal error beside the paper's Table 2."""
+    """Cumulative distribution of the closest and terminal error.
+
+    The paper's Table 2 stands beside that of its spacecraft, LM50.
+    """
     figure, axes = plt.subplots(1, 2, figsize=(9, 4), sharey=True, layout="constrained")
     for axis, state in zip(axes, ("closest", "terminal")):
         ours = np.sort(np.rad2deg(np.asarray(getattr(flight.flown, f"{state}_angle"))))
         axis.semilogx(ours, np.arange(1, len(ours) + 1) / len(ours), "k", label="this controller")
-        paper = PAPER_TABLE_2[state, "error_deg"][2:]
-        axis.semilogx(paper, (0, 0.25, 0.5, 0.75, 1), "s--", color="tab:red", label="paper")
+        if flight.is_the_papers:
+            paper = PAPER_TABLE_2[state, "error_deg"][2:]
+            axis.semilogx(paper, (0, 0.25, 0.5, 0.75, 1), "s--", color="tab:red", label="paper")
         axis.set_xlabel(f"{state} error angle φ (°)")
         axis.grid(alpha=0.3)
     axes[0].set_ylabel("share of the slews")
@@ -201,13 +222,13 @@ def settling(flight: Flight, folder: Path) -> Path:
         means = [np.mean(x) if len(x) else np.nan for x in binned]
         axis.plot(middle, means, style, label=label)
     axis.set_xlabel("slew angle (°)")
-    axis.set_ylabel("settling time to 0.25° (s)")
+    axis.set_ylabel(f"settling time to {flight.goal_deg:g}° (s)")
     axis.set_title(f"Settling at {flight.hz}")
     axis.legend()
     return _save(figure, folder, "settling")
 
 
-def learning_curve(metrics: list[dict], folder: Path) -> Path:
+def learning_curve(metrics: list[dict], is_the_papers: bool, folder: Path) -> Path:
     """Return, success and terminal error over agent steps, from a run's metrics."""
     rows = [row for row in metrics if row["episode_return"]]
     steps = [int(row["agent_steps"]) / 1e6 for row in rows]
@@ -221,8 +242,9 @@ def learning_curve(metrics: list[dict], folder: Path) -> Path:
         axis.plot(steps, [float(row[name]) for row in rows], "k", linewidth=1)
         axis.set_ylabel(label)
         axis.grid(alpha=0.3)
-    axes[0].axhline(2500, color="tab:red", linestyle="--", label="the paper's plateau")
-    axes[0].legend()
+    if is_the_papers:
+        axes[0].axhline(2500, color="tab:red", linestyle="--", label="the paper's plateau")
+        axes[0].legend()
     axes[2].set_yscale("log")
     axes[2].set_xlabel("agent steps (millions)")
     axes[0].set_title("Learning: training episodes")

@@ -1,10 +1,13 @@
 """What eval.py prints: the paper's Table 2 beside ours."""
 
+import dataclasses
+
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
 from attjax.evaluation import STATISTICS
+from attjax.specification import LM50, Spacecraft
 
 PAPER_TABLE_2 = {
     ("closest", "error_deg"): (
@@ -38,30 +41,39 @@ ROW_NAMES = ("Mean", "Std. dev.", "Min", "Q1", "Q2", "Q3", "Max")
 SYMBOLS = {"error_deg": "φ (°)", "rate_rad_s": "‖ω‖ (rad/s)"}
 
 
-def print_report(result: dict) -> None:
-    """Print one controller's name, conditions and statistics, as in ``eval.py --json``."""
+def print_report(result: dict, spacecraft: Spacecraft) -> None:
+    """Print one controller's name, conditions and statistics, as in ``eval.py --json``.
+
+    The paper's statistics stand beside those of its spacecraft, LM50.
+    """
     console = _console()
-    console.print(f"{result['controller']}: {_conditions(result)}\n")
-    console.print(_table_2(result))
+    console.print(f"{result['controller']}: {_conditions(result, spacecraft)}\n")
+    console.print(_table_2(result, is_the_papers(spacecraft)))
     console.print()
     for name, value in _summary(result):
         console.print(f"{name:<18}{value}")
 
 
-def print_comparison(results: list[dict]) -> None:
-    """Print several controllers' results over the same slews, and the paper's, side by side."""
+def print_comparison(results: list[dict], spacecraft: Spacecraft) -> None:
+    """Print several controllers' results over the same slews, side by side.
+
+    The paper's results stand beside those of its spacecraft, LM50.
+    """
     console = _console()
-    console.print(f"{_conditions(results[0])}\n")
+    console.print(f"{_conditions(results[0], spacecraft)}\n")
     table = _table("")
     for result in results:
         table.add_column(result["controller"], justify="right", no_wrap=True)
-    table.add_column("paper", justify="right", no_wrap=True, style="dim")
-    table.add_row("success (%)", *(f"{100 * r['success_rate']:.2f}" for r in results), "100.00")
+    with_paper = is_the_papers(spacecraft)
+    if with_paper:
+        table.add_column("paper", justify="right", no_wrap=True, style="dim")
+    success = [f"{100 * r['success_rate']:.2f}" for r in results]
+    table.add_row("success (%)", *success, *["100.00"] * with_paper)
     table.add_row("overspeed (%)", *(f"{100 * r['overspeed_rate']:.2f}" for r in results))
     for name, (state, quantity, statistic) in POINTING_ROWS.items():
         ours = [_fixed(r[state][quantity][statistic]) for r in results]
         paper = PAPER_TABLE_2[state, quantity][STATISTICS.index(statistic)]
-        table.add_row(name, *ours, _fixed(paper))
+        table.add_row(name, *ours, *[_fixed(paper)] * with_paper)
     for name, (quantity, statistic) in OTHER_ROWS.items():
         values = [r[quantity][statistic] for r in results]
         table.add_row(name, *("–" if x is None else f"{x:.2f}" for x in values))
@@ -80,24 +92,32 @@ def _table(first_column):
     return table
 
 
-def _conditions(result):
+def _conditions(result, spacecraft):
     return (
         f"{result['episodes']:,} slews at {result['control_hz']:.2f} Hz "
         f"(frameskip {result['frameskip']}) of {result['duration_s']:.2f} s, "
-        f"seed {result['seed']}"
+        f"{'' if is_the_papers(spacecraft) else spacecraft.name + ', '}seed {result['seed']}"
     )
 
 
-def _table_2(result):
+def is_the_papers(spacecraft: Spacecraft) -> bool:
+    """Whether the paper's results can stand beside a spacecraft's; the duration may differ."""
+    return dataclasses.replace(spacecraft, duration=LM50.duration) == LM50
+
+
+def _table_2(result, with_paper):
     table = _table("\n")
     for state, quantity in PAPER_TABLE_2:
         title = f"{state.capitalize()}\n{SYMBOLS[quantity]}"
         table.add_column(title, justify="right", no_wrap=True)
-        table.add_column("\npaper", justify="right", no_wrap=True, style="dim")
+        if with_paper:
+            table.add_column("\npaper", justify="right", no_wrap=True, style="dim")
     for index, (statistic, name) in enumerate(zip(STATISTICS, ROW_NAMES)):
         cells = []
         for (state, quantity), paper in PAPER_TABLE_2.items():
-            cells += [_fixed(result[state][quantity][statistic]), f"{paper[index]:.6f}"]
+            cells.append(_fixed(result[state][quantity][statistic]))
+            if with_paper:
+                cells.append(f"{paper[index]:.6f}")
         table.add_row(name, *cells)
     return table
 

@@ -1,6 +1,7 @@
 """Rewards: functions ``reward(transition) -> scalar`` of one agent step.
 
-To bring your own, pass any function of this signature to ``AttitudeEnv(reward=...)``.
+To bring your own, pass any function of this signature to ``AttitudeEnv(reward=...)``, or name it
+in ``train.py --reward module:function``.
 """
 
 from typing import NamedTuple
@@ -27,6 +28,7 @@ class Transition(NamedTuple):
         truncated: the time limit was reached, and the rate limit was not exceeded.
         goal_angle: largest φ that counts as pointing, rad.
         control_period: length of the agent step, s.
+        torque: (3,) torque of the action, body frame, N m.
     """
 
     quaternion: chex.Array
@@ -36,6 +38,7 @@ class Transition(NamedTuple):
     truncated: chex.Array
     goal_angle: chex.Array
     control_period: chex.Array
+    torque: chex.Array
 
 
 def scalar_part_increased(before: chex.Array, after: chex.Array) -> chex.Array:
@@ -62,7 +65,8 @@ def paper_reward(transition: Transition) -> chex.Array:
 
     Example:
         >>> goal = jnp.array([0.0, 0.0, 0.0, 1.0])
-        >>> at_rest = Transition(goal, goal, jnp.zeros(3), False, False, 0.00436, 0.0875)
+        >>> rest = jnp.zeros(3)
+        >>> at_rest = Transition(goal, goal, rest, False, False, 0.00436, 0.0875, rest)
         >>> paper_reward(at_rest).item()
         9.0
     """
@@ -83,7 +87,8 @@ def logarithmic_reward(transition: Transition) -> chex.Array:
 
     Example:
         >>> goal = jnp.array([0.0, 0.0, 0.0, 1.0])
-        >>> at_rest = Transition(goal, goal, jnp.zeros(3), False, False, 0.00436, 0.05)
+        >>> rest = jnp.zeros(3)
+        >>> at_rest = Transition(goal, goal, rest, False, False, 0.00436, 0.05, rest)
         >>> round(logarithmic_reward(at_rest).item(), 4)
         12.0
     """

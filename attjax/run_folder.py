@@ -11,15 +11,16 @@ import os
 import shutil
 from pathlib import Path
 
-from attjax import settings
+from attjax import settings, specification
 from attjax.settings import Settings
+from attjax.specification import LM50, Spacecraft
 
 try:
     import fcntl
 except ImportError:  # Windows, where runs are not kept apart
     fcntl = None
 
-FORMAT = 4
+FORMAT = 5
 CONFIG, METRICS = "config.json", "metrics.csv"
 OWN_FILES = {CONFIG, METRICS, CONFIG + ".tmp", METRICS + ".tmp"}
 
@@ -30,11 +31,24 @@ class FolderError(Exception):
 
 @dataclasses.dataclass(frozen=True)
 class Config:
-    """What a run was started with."""
+    """What a run was started with.
+
+    Raises:
+        ValueError: an agent step takes longer than the spacecraft's episode.
+    """
 
     preset: str
     seed: int
     settings: Settings
+    spacecraft: Spacecraft = LM50
+
+    def __post_init__(self):
+        longest = max(self.settings.frameskips)
+        if self.spacecraft.max_steps(longest) < 1:
+            raise ValueError(
+                f"frameskips holds {longest}; in {self.spacecraft.duration} s, the duration of an "
+                f"episode, it must be at most {self.spacecraft.max_steps(0) - 1}"
+            )
 
 
 @contextlib.contextmanager
@@ -141,7 +155,10 @@ def read_config(folder: Path) -> Config:
                 f"{path} has format {content['format']}; this version of attjax reads {FORMAT}"
             )
         return Config(
-            str(content["preset"]), int(content["seed"]), settings.from_json(content["settings"])
+            str(content["preset"]),
+            int(content["seed"]),
+            settings.from_json(content["settings"]),
+            specification.from_lists(content["spacecraft"]),
         )
     except (ValueError, KeyError, TypeError, OverflowError) as error:
         raise FolderError(f"{path} cannot be read: {error!r}") from None

@@ -6,6 +6,8 @@ This module imports nothing heavy, so that ``--help`` is instant.
 import dataclasses
 import math
 
+from attjax import user_functions
+
 MOST_SAMPLES = 2**27
 """Of an update: some 100 GB."""
 
@@ -13,7 +15,7 @@ MOST_SAMPLES = 2**27
 def setting(help: str, **limits):
     """A field without default. ``limits``: ``choices``, or ``low``, ``high`` (inclusive),
     ``above`` and ``below`` (exclusive), of each element where the field is a tuple, and ``most``
-    elements.
+    elements. ``or_function``: a user's function will do, as ``module:function``.
     """
     return dataclasses.field(metadata={"help": help, **limits})
 
@@ -42,8 +44,9 @@ class Settings:
         most=64,
     )
     reward: str = setting(
-        "Eq. 12-13 with terminal rewards, or -log10 of the error angle",
+        "Eq. 12-13 with terminal rewards, -log10 of the error angle, or module:function",
         choices=("paper", "logarithmic"),
+        or_function=True,
     )
     reward_scale: float = setting("factor on the reward the learner sees", above=0)
     time_limit_terminates: bool = setting(
@@ -64,8 +67,10 @@ class Settings:
 
     # The networks
     features: str = setting(
-        "network inputs: Eq. 11 as it is, or tanh(k x) of attitude and rate at nine scales",
+        "network inputs: Eq. 11 as it is, tanh(k x) of attitude and rate at nine scales, or "
+        "module:function",
         choices=("state", "multiscale"),
+        or_function=True,
     )
     hidden_sizes: tuple[int, ...] = setting(
         "neurons of each hidden layer (Table 3)", low=1, high=8192, most=8
@@ -177,7 +182,8 @@ def _fits(kind, limits, x):
     if type(x) is not kind and not (kind is float and type(x) is int):
         return False
     if kind not in (int, float):
-        return x in limits.get("choices", (x,))
+        is_function = limits.get("or_function", False) and user_functions.is_name(x)
+        return is_function or x in limits.get("choices", (x,))
     return (
         math.isfinite(x)
         and limits.get("low", x) <= x <= limits.get("high", x)
@@ -187,7 +193,8 @@ def _fits(kind, limits, x):
 
 def _describe(limits):
     if "choices" in limits:
-        return "one of " + ", ".join(limits["choices"])
+        choices = "one of " + ", ".join(limits["choices"])
+        return choices + (", or module:function" if "or_function" in limits else "")
     words = {"low": "at least", "above": "above", "high": "at most", "below": "below"}
     described = " and ".join(f"{word} {limits[k]}" for k, word in words.items() if k in limits)
     return described + (f", {limits['most']} of them at most" if "most" in limits else "")

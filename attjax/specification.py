@@ -5,13 +5,18 @@ This module imports nothing heavy, so that errors in a description are instant.
 
 import dataclasses
 import math
+import tomllib
+from pathlib import Path
 
 INTEGRATION_STEP = 1 / 240
 """Length of one RK4 step, s (paper, section 2.3)."""
 
+NEEDED = ("inertia", "torque_levels")
+"""What a file that describes another spacecraft than LM50 must give."""
+
 LEAST_MOMENT, MOST_MOMENT = 1e-9, 1e9
 MOST_ACTIONS = 1000
-MOST_RK4_STEPS = 10**7
+MOST_DURATION = 1e6
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -66,8 +71,10 @@ class Spacecraft:
         if self.slew_angles_deg[0] > self.slew_angles_deg[1]:
             shown = _shown(self.slew_angles_deg)
             raise ValueError(f"slew_angles_deg is {shown}; the first must be the least")
-        longest = MOST_RK4_STEPS * INTEGRATION_STEP
-        _check_number("duration", self.duration, INTEGRATION_STEP, longest)
+        _check_number("duration", self.duration, INTEGRATION_STEP, MOST_DURATION)
+
+    def __str__(self):
+        return self.name
 
     def _check_inertia(self):
         rows = self.inertia
@@ -103,6 +110,19 @@ class Spacecraft:
                 f"they must be at most {MOST_ACTIONS}"
             )
 
+    @classmethod
+    def from_toml(cls, path: str | Path) -> "Spacecraft":
+        """Read a TOML file of these names; it must give ``inertia`` and ``torque_levels``.
+
+        Without a name, the spacecraft has the file's.
+
+        Raises:
+            OSError: it cannot be read.
+            ValueError: it is no TOML, or something in it is not as said.
+        """
+        values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return from_lists({"name": Path(path).stem} | values, NEEDED)
+
     @property
     def num_actions(self) -> int:
         """No torque, and each level about each axis in both directions."""
@@ -125,16 +145,21 @@ class Spacecraft:
         return int(self.duration / INTEGRATION_STEP + 1e-6) // (frameskip + 1)
 
 
-def from_lists(values: dict) -> Spacecraft:
+def from_lists(values: dict, needed: tuple[str, ...] = ()) -> Spacecraft:
     """A spacecraft from what TOML or JSON make of its values, lists for tuples.
 
     Raises:
-        ValueError: a name is unknown, or a value is not as :class:`Spacecraft` says.
+        ValueError: a name is unknown or missing, or a value is not as :class:`Spacecraft` says.
     """
+    if not isinstance(values, dict):
+        raise ValueError(f"spacecraft is {values!r}; it must be a table")
     names = [field.name for field in dataclasses.fields(Spacecraft)]
     unknown = sorted(set(values) - set(names))
     if unknown:
         raise ValueError(f"{unknown[0]} is unknown; there are {', '.join(names)}")
+    missing = [name for name in needed if name not in values]
+    if missing:
+        raise ValueError(f"{missing[0]} is missing; there must be {' and '.join(needed)}")
     return Spacecraft(**{name: _tuples(value) for name, value in values.items()})
 
 

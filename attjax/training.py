@@ -27,7 +27,8 @@ class Run:
 
     def __init__(self, folder: Path, config: Config, stop: cli.StopSignals):
         self.folder, self.config, self.settings, self.stop = folder, config, config.settings, stop
-        self.setup = assembly.setup(self.settings, assembly.num_devices(self.settings))
+        num_devices = assembly.num_devices(self.settings)
+        self.setup = assembly.setup(self.settings, config.spacecraft, num_devices)
         self.env_params = assembly.env_params(self.setup)
         self.learner = learner.init(self.setup, self.env_params, jax.random.key(config.seed))
         if checkpoint.latest(folder) is not None:
@@ -49,8 +50,9 @@ class Run:
     def describe(self, device) -> None:
         """Print what the run is, and where it stands."""
         settings = self.settings
+        craft = self.config.spacecraft
         print(
-            f"preset {self.config.preset}, seed {self.config.seed}, "
+            f"preset {self.config.preset}, {craft.name}, seed {self.config.seed}, "
             f"{settings.num_updates * settings.steps_per_update:,} agent steps "
             f"({settings.num_updates:,} updates of {settings.steps_per_update:,}) on "
             f"{self.setup.num_devices} x {device.device_kind} ({device.platform}), in {self.folder}"

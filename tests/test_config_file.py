@@ -6,13 +6,14 @@ import pytest
 from commands import ROOT, one_line_error, run, train_script
 
 from attjax import cli, config_file, presets, run_folder
+from attjax.specification import LM50
 
 
 @pytest.mark.parametrize("preset", presets.PRESETS)
 def test_a_printed_file_reads_as_what_it_was_printed_from(tmp_path, preset):
     path = tmp_path / "run.toml"
     path.write_text(config_file.text(run_folder.Config(preset, 7, presets.PRESETS[preset])))
-    expected = {"preset": preset, "seed": 7} | vars(presets.PRESETS[preset])
+    expected = {"preset": preset, "seed": 7, "spacecraft": LM50} | vars(presets.PRESETS[preset])
     assert config_file.read(path) == expected
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import attjax
 
 LAYERS = [
-    {"settings", "specification", "checks", "spaces", "kernel", "vector", "sb3"},
-    {"programs", "context"},
+    {"user_functions", "specification", "checks", "spaces", "kernel", "vector", "sb3"},
+    {"settings", "programs", "context"},
     {"quaternion", "rigid_body"},
     {"dynamics"},
     {"spacecraft", "reward", "observation"},

@@ -31,8 +31,8 @@ def test_sizes_are_table_3():
 def test_multiscale_features_resolve_every_decade():
     """A change of 1 % at any distance from the goal moves some feature by 1e-3 or more."""
     for magnitude in 10.0 ** np.arange(-6, 0):
-        a = networks.multiscale_features(observe([magnitude, 0, 0]), CONTEXT.control_period)
-        b = networks.multiscale_features(observe([1.01 * magnitude, 0, 0]), CONTEXT.control_period)
+        a = networks.multiscale_features(observe([magnitude, 0, 0]), CONTEXT)
+        b = networks.multiscale_features(observe([1.01 * magnitude, 0, 0]), CONTEXT)
         assert a.shape == (57,)
         assert float(jnp.abs(a - b).max()) > (1e-3 if magnitude > 1e-5 else 1e-4)
         assert float(jnp.abs(a).max()) <= 3
@@ -41,8 +41,9 @@ def test_multiscale_features_resolve_every_decade():
 def test_multiscale_features_make_the_last_stretch_the_same_at_every_rate():
     """Half the period at half the distance: the same ω brings it there in as many actions."""
     rate = [2e-5, -1e-5, 3e-5]
-    slow = networks.multiscale_features(observe(rate, (2e-5, 4e-5, -6e-5, 1.0)), 0.0875)
-    fast = networks.multiscale_features(observe(rate, (1e-5, 2e-5, -3e-5, 1.0)), 0.04375)
+    contexts = [CONTEXT.replace(control_period=jnp.array(x)) for x in (0.0875, 0.04375)]
+    slow = networks.multiscale_features(observe(rate, (2e-5, 4e-5, -6e-5, 1.0)), contexts[0])
+    fast = networks.multiscale_features(observe(rate, (1e-5, 2e-5, -3e-5, 1.0)), contexts[1])
     np.testing.assert_allclose(slow[:-2], fast[:-2], rtol=1e-6)
 
 
