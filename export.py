@@ -66,6 +66,11 @@ def _flight_policy(arguments):
     config = run_folder.read_config(folder)
     update = checkpoint.best(folder) if arguments.best else checkpoint.latest(folder)
     policy, params = checkpoint.restore_network(folder, update)
+    if callable(policy.features) and arguments.format != "stablehlo":
+        raise cli.UserError(
+            f"the policy in {folder} sees {config.settings.features}, which --format "
+            f"{arguments.format} does not know; stablehlo does"
+        )
     origin = f"preset {config.preset}, seed {config.seed}, update {update}"
     try:
         env = AttitudeEnv(arguments.frameskip, spacecraft=config.spacecraft)

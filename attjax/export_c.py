@@ -6,7 +6,7 @@ from string import Template
 import numpy as np
 
 import attjax
-from attjax import dynamics, flight_policy, networks
+from attjax import flight_policy, networks
 from attjax.flight_policy import FlightPolicy
 
 POLICY_FILES = ("attjax_policy.h", "attjax_policy.c")
@@ -82,14 +82,15 @@ def _fill(name, values):
 def _header_values(flight):
     context = flight.context
     return operations(flight) | {
-        "origin": flight.origin,
+        "origin": _comment(flight.origin),
         "actions": len(flight.torque_table),
-        "inertia": ", ".join(f"{x:g}" for x in np.asarray(context.inertia)),
+        "spacecraft": _comment(flight.env.spacecraft.name),
+        "inertia": _inertia(flight.env.spacecraft.inertia),
         "constant_bytes": constant_bytes(flight),
         "stack_bytes": stack_bytes(flight),
         "no_torque": flight.no_torque,
         "control_period": _number(flight.env.control_period),
-        "pulse": _number(dynamics.INTEGRATION_STEP),
+        "pulse": _number(context.torque_duration),
         "rate_limit": _number(context.rate_limit),
     }
 
@@ -168,9 +169,16 @@ def _vector_values(flight, seed):
         for i in chosen
     ]
     slews = flight_policy.fly_table_5(flight)
+    inertia = np.asarray(flight.context.inertia, float)
+    tensor = np.diag(inertia) if inertia.ndim == 1 else inertia
+    rk4_steps = 1 + flight.env.frameskip
+    torque_steps = rk4_steps if flight.env.spacecraft.torque_held else 1
     return {
-        "inertia_values": _row(flight.context.inertia, _double),
-        "frameskip": flight.env.frameskip,
+        "tensor": _table(tensor, _double),
+        "inverse": _table(np.linalg.inv(tensor), _double),
+        "torque_steps": torque_steps,
+        "coasting_steps": rk4_steps - torque_steps,
+        "goal_deg": _double(flight.env.spacecraft.goal_angle_deg),
         "decisions": int(flight.env.default_params.max_steps_in_episode),
         "slews": len(slews.rate),
         "slew_start": _table(slews.quaternion, _double),
@@ -179,6 +187,18 @@ def _vector_values(flight, seed):
         "vectors": len(chosen),
         "vector_values": "{\n    " + ",\n    ".join(rows) + "}",
     }
+
+
+def _inertia(values):
+    if isinstance(values[0], tuple):
+        rows = "; ".join(" ".join(f"{x:g}" for x in row) for row in values)
+        return f"inertia tensor\n * ({rows})"
+    return f"moments of inertia\n * ({', '.join(f'{x:g}' for x in values)})"
+
+
+def _comment(text):
+    """Text that may stand in a C comment."""
+    return text.encode("ascii", "replace").decode().replace("*/", "* /").replace("??/", "?? /")
 
 
 def _table(values, number=None):

@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import AttitudeEnv, checkpoint, export_c, flight_policy
+from attjax import AttitudeEnv, checkpoint, export_c, flight_policy, run_folder
 from attjax.flight_policy import Decisions, FlightPolicy
 
 SLEWS = 400
@@ -28,7 +28,8 @@ STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror"
 def load(folder: Path, frameskip: int) -> FlightPolicy:
     """The newest policy of a run folder, to fly at this rate."""
     policy, params = checkpoint.restore_network(folder)
-    return FlightPolicy(policy, params, AttitudeEnv(frameskip), f"a run in {Path(folder).name}")
+    env = AttitudeEnv(frameskip, spacecraft=run_folder.read_config(folder).spacecraft)
+    return FlightPolicy(policy, params, env, f"a run in {Path(folder).name}")
 
 
 def compiler() -> str | None:

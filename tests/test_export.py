@@ -8,11 +8,13 @@ import exported
 import jax
 import numpy as np
 import pytest
+from bodies import rotated_inertia
 from commands import ROOT, export_script, one_line_error
 
 from attjax import AttitudeEnv, assembly, export_c, flight_policy
 from attjax.flight_policy import FlightPolicy
 from attjax.networks import Policy
+from attjax.specification import LM50, Spacecraft
 
 PRECISE = ROOT / "pretrained" / "precise"
 STATES = 20_000
@@ -35,18 +37,31 @@ def c_files(frameskip):
 
 
 @functools.cache
-def untrained(features, hidden_sizes, rate_margin):
+def untrained(features, hidden_sizes, rate_margin, spacecraft=LM50):
     """Random weights, and biases too, that leave the decision to the state."""
-    policy = Policy(features, hidden_sizes, rate_margin=rate_margin)
+    policy = Policy(features, hidden_sizes, spacecraft.num_actions, rate_margin)
     shapes = jax.eval_shape(lambda: assembly.initial_parameters(policy)["policy"])
     leaves, tree = jax.tree.flatten(shapes)
     rng = np.random.default_rng(5)
     leaves = [rng.normal(0, (0.1, 1.0)[x.ndim - 1], x.shape).astype(np.float32) for x in leaves]
     params = {"policy": jax.tree.unflatten(tree, leaves)}
-    return FlightPolicy(policy, params, AttitudeEnv(10), "no training")
+    return FlightPolicy(policy, params, AttitudeEnv(10, spacecraft=spacecraft), "no training")
 
 
-OTHERS = [("state", (24, 8), 0.0), ("state", (16,), 0.99), ("multiscale", (8, 8, 8), 0.0)]
+WHEELS = Spacecraft(
+    name="four wheels",
+    inertia=tuple(map(tuple, rotated_inertia().tolist())),
+    torque_levels=(0.1, 0.01),
+    torque_axes=((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)),
+    torque_held=True,
+    duration=6.0,
+)
+OTHERS = [
+    ("state", (24, 8), 0.0),
+    ("state", (16,), 0.99),
+    ("multiscale", (8, 8, 8), 0.0),
+    ("multiscale", (16,), 0.99, WHEELS),
+]
 
 
 @functools.cache
@@ -104,6 +119,17 @@ def test_the_c_test_program_passes_and_flies_table_5_as_jax(tmp_path, frameskip)
     assert len(errors) == 3
     for in_c, in_jax in np.array(errors, float):
         assert in_c == pytest.approx(in_jax, abs=2e-6) and in_c < 0.001
+
+
+@needs_compiler
+def test_the_c_test_program_flies_another_spacecraft_as_jax(tmp_path):
+    """A tensor of inertia, other torques than along the axes, held through the control period."""
+    exported.write(tmp_path, export_c.files(untrained("multiscale", (16,), 0.99, WHEELS), seed=0))
+    printed = exported.run_test_program(tmp_path)
+    errors = re.findall(r"the end ([\d.]+) deg, in attjax ([\d.]+); rate ([\d.]+)", printed)
+    for in_c, in_jax, rate in np.array(errors, float):
+        assert in_c == pytest.approx(in_jax, abs=2e-6) and rate > 0.01
+    assert len(errors) == 3 and "four wheels" in (tmp_path / "attjax_policy.h").read_text()
 
 
 @needs_compiler

@@ -1,5 +1,5 @@
 /*
- * Attitude control policy: which of $actions torque pulses to fire next.
+ * Attitude control policy: which of $actions torques to apply next.
  *
  * Written by attjax $version from a policy trained with it:
  * $origin.
@@ -7,9 +7,8 @@
  * Call attjax_decide once every ATTJAX_CONTROL_PERIOD, then apply the torque
  * attjax_torque_table[action] for the first ATTJAX_PULSE of that period.
  *
- * The policy was trained for one spacecraft, with principal moments of inertia
- * ($inertia) kg m^2 along the axes of the body frame,
- * and for these torques, this control period and this rate limit. It is valid for no other.
+ * The policy was trained for one spacecraft, $spacecraft, with the $inertia
+ * kg m^2 in the axes of the body frame, and for these torques, this control period and this rate limit. It is valid for no other.
  *
  * Static size:  $constant_bytes bytes of constants, no variables;
  *               $stack_bytes bytes of arrays on the stack, at most, in a call.

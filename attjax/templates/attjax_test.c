@@ -16,7 +16,7 @@
 
 #define STATE 7 /* error quaternion, scalar last, and angular velocity */
 #define STEP (1.0 / 240.0)
-#define GOAL_DEG 0.25
+#define GOAL_DEG $goal_deg
 #define DEG_PER_RAD 57.295779513082321
 #define TIMED 200 /* passes over the vectors */
 
@@ -24,14 +24,22 @@
 static void rate(const double x[STATE], const float torque[3], double dx[STATE])
 {
     const double *q = x, *w = x + 4;
+    double h[3], moment[3];
 
     dx[0] = 0.5 * (w[2] * q[1] - w[1] * q[2] + w[0] * q[3]);
     dx[1] = 0.5 * (w[0] * q[2] - w[2] * q[0] + w[1] * q[3]);
     dx[2] = 0.5 * (w[1] * q[0] - w[0] * q[1] + w[2] * q[3]);
     dx[3] = -0.5 * (w[0] * q[0] + w[1] * q[1] + w[2] * q[2]);
     for (int i = 0; i < 3; i++) {
+        h[i] = inertia[i][0] * w[0] + inertia[i][1] * w[1] + inertia[i][2] * w[2];
+    }
+    for (int i = 0; i < 3; i++) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
-        dx[4 + i] = ((inertia[j] - inertia[k]) * w[j] * w[k] + (double)torque[i]) / inertia[i];
+        moment[i] = (double)torque[i] - (w[j] * h[k] - w[k] * h[j]);
+    }
+    for (int i = 0; i < 3; i++) {
+        const double *row = inverse[i];
+        dx[4 + i] = row[0] * moment[0] + row[1] * moment[1] + row[2] * moment[2];
     }
 }
 
@@ -65,17 +73,21 @@ static double norm(const double *x, int size)
     return sqrt(sum);
 }
 
-/* One control period: the policy decides, fires, and the spacecraft coasts. */
+/* One control period: the policy decides, the torque acts, and the spacecraft coasts. */
 static void control(double x[STATE])
 {
     static const float none[3] = {0.0f, 0.0f, 0.0f};
+    const float *torque;
     float single[STATE];
     double length;
 
     for (int i = 0; i < STATE; i++) {
         single[i] = (float)x[i];
     }
-    advance(x, attjax_torque_table[attjax_decide(single, single + 4)]);
+    torque = attjax_torque_table[attjax_decide(single, single + 4)];
+    for (int n = 0; n < TORQUE_STEPS; n++) {
+        advance(x, torque);
+    }
     for (int n = 0; n < COASTING_STEPS; n++) {
         advance(x, none);
     }

@@ -2,12 +2,14 @@
 #ifndef ATTJAX_VECTORS_H
 #define ATTJAX_VECTORS_H
 
-/* Torque-free steps of 1/240 s after the one with torque, and decisions in a slew. */
-#define COASTING_STEPS $frameskip
+/* Steps of 1/240 s with torque and without it after a decision, and decisions in a slew. */
+#define TORQUE_STEPS $torque_steps
+#define COASTING_STEPS $coasting_steps
 #define DECISIONS $decisions
 
-/* Principal moments of inertia, kg m^2. */
-static const double inertia[3] = $inertia_values;
+/* The inertia tensor, kg m^2, and its inverse. */
+static const double inertia[3][3] = $tensor;
+static const double inverse[3][3] = $inverse;
 
 /* Slews from rest, and their error (degrees) and rate (rad/s) at the end in attjax. */
 #define SLEWS $slews
