@@ -2,10 +2,10 @@
 
 import importlib
 
-__all__ = ["AttitudeEnv", "EnvParams", "EnvState", "step"]
+__all__ = ["AttitudeEnv", "EnvParams", "EnvState", "Spacecraft", "step"]
 __version__ = "0.1.0"
 
-_MODULES = {"AttitudeEnv": "env", "EnvParams": "spacecraft", "EnvState": "spacecraft"}
+_MODULES = {"AttitudeEnv": "env", "Spacecraft": "specification"}
 
 
 def __getattr__(name):

@@ -141,7 +141,7 @@ class AttitudeEnv:
             truncated=truncated,
             goal_angle=params.goal_angle,
             control_period=self._period(params),
-            torque=params.torque_table[action],
+            impulse=params.torque_table[action] * self.context(params).torque_duration,
         )
         angle = quaternions.error_angle(next_state.quaternion)
         info = {

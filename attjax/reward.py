@@ -28,7 +28,7 @@ class Transition(NamedTuple):
         truncated: the time limit was reached, and the rate limit was not exceeded.
         goal_angle: largest φ that counts as pointing, rad.
         control_period: length of the agent step, s.
-        torque: (3,) torque of the action, body frame, N m.
+        impulse: (3,) what the action gives, body frame, N m s: its torque for as long as it acts.
     """
 
     quaternion: chex.Array
@@ -38,7 +38,7 @@ class Transition(NamedTuple):
     truncated: chex.Array
     goal_angle: chex.Array
     control_period: chex.Array
-    torque: chex.Array
+    impulse: chex.Array
 
 
 def scalar_part_increased(before: chex.Array, after: chex.Array) -> chex.Array:

@@ -38,7 +38,7 @@ def transition(before, after, terminated=False, truncated=False, period=0.0875):
         truncated=jnp.array(truncated),
         goal_angle=jnp.array(GOAL, float),
         control_period=jnp.array(period, float),
-        torque=jnp.zeros(3),
+        impulse=jnp.zeros(3),
     )
 
 
