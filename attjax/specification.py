@@ -58,6 +58,8 @@ class Spacecraft:
     duration: float = 43.75
 
     def __post_init__(self):
+        for field in dataclasses.fields(self):
+            object.__setattr__(self, field.name, _tuples(getattr(self, field.name)))
         if not isinstance(self.name, str) or not self.name.isprintable() or not self.name:
             raise ValueError(f"name is {self.name!r}; it must be a line of text")
         if not isinstance(self.torque_held, bool):
@@ -146,7 +148,7 @@ class Spacecraft:
 
 
 def from_lists(values: dict, needed: tuple[str, ...] = ()) -> Spacecraft:
-    """A spacecraft from what TOML or JSON make of its values, lists for tuples.
+    """A spacecraft from what TOML or JSON make of its values.
 
     Raises:
         ValueError: a name is unknown or missing, or a value is not as :class:`Spacecraft` says.
@@ -160,11 +162,13 @@ def from_lists(values: dict, needed: tuple[str, ...] = ()) -> Spacecraft:
     missing = [name for name in needed if name not in values]
     if missing:
         raise ValueError(f"{missing[0]} is missing; there must be {' and '.join(needed)}")
-    return Spacecraft(**{name: _tuples(value) for name, value in values.items()})
+    return Spacecraft(**values)
 
 
 def _tuples(value):
-    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+    """Tuples for lists and arrays: a spacecraft can be hashed, and cannot be changed."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return tuple(map(_tuples, value)) if isinstance(value, list | tuple) else value
 
 
 def _check_number(name, x, low, high):

@@ -28,6 +28,12 @@ def test_actions_are_levels_about_axes_in_both_directions():
     assert LM50.num_actions == 19
 
 
+def test_lists_and_arrays_will_do():
+    given = Spacecraft(inertia=rotated_inertia(), torque_levels=[np.float64(0.5)])
+    assert given == Spacecraft(inertia=rotated_inertia().tolist(), torque_levels=(0.5,))
+    assert hash(AttitudeEnv(5, spacecraft=given)) == hash(AttitudeEnv(5, spacecraft=given))
+
+
 def test_episodes_are_whole_agent_steps_of_the_duration():
     assert [LM50.max_steps(frameskip) for frameskip in (5, 20)] == [1750, 500]
     assert CUBESAT.max_steps(23) == 900
