@@ -91,9 +91,9 @@ def _evaluate(arguments, controllers, steps, plots, metrics):
 
 def _metrics(folder):
     """The rows of the run's metrics.csv, for the learning curve."""
-    from attjax import progress
+    from attjax import metrics
 
-    return progress.read_rows(folder / run_folder.METRICS)
+    return metrics.read_rows(folder / run_folder.METRICS)
 
 
 def _prepare_plots(folder):

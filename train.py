@@ -6,6 +6,7 @@ Example:
 """
 
 import dataclasses
+import importlib
 import sys
 from pathlib import Path
 
@@ -26,6 +27,8 @@ def parse_arguments(argv):
     existing.add_argument("--overwrite", action="store_true", help="replace the folder's run")
     save_help = "seconds between two checkpoints"
     cli.add_number(parser, "save-every", float, 30.0, save_help, low=0)
+    tensorboard_help = "also write TensorBoard's event files, into FOLDER/tensorboard"
+    parser.add_argument("--tensorboard", action="store_true", help=tensorboard_help)
     debug_help = "check every operation, and name the first that makes a NaN (slow)"
     parser.add_argument("--debug-nans", action="store_true", help=debug_help)
     config_help = "TOML file with preset, seed and [settings]; flags override it"
@@ -46,12 +49,25 @@ def main(argv=None) -> int:
         print(config_file.text(new), end="")
         return 0
     with cli.StopSignals() as stop, cli.one_line_errors("train.py", run_folder.FolderError):
+        if arguments.tensorboard:
+            _check_tensorboard()
         device = cli.select_device(arguments.device)
         advice = "fewer --num-envs or a shorter --rollout-length take less"
         with run_folder.opened(arguments.checkpoint), cli.enough_memory(advice):
             run = _open(arguments, given, new, stop)
+            if arguments.tensorboard:
+                run.write_events()
             run.describe(device)
             return run.train(arguments.save_every, arguments.debug_nans)
+
+
+def _check_tensorboard():
+    """Fail before anything is written."""
+    try:
+        importlib.import_module("tensorboardX")
+    except ImportError:
+        needed = "--tensorboard needs tensorboardX: pip install 'attjax[tensorboard]'"
+        raise cli.UserError(needed) from None
 
 
 def _given(arguments):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import jax
 
-from attjax import assembly, checkpoint, cli, learner, nan_search, ppo, progress
+from attjax import assembly, checkpoint, cli, learner, metrics, nan_search, ppo, progress
 from attjax.run_folder import Config
 from attjax.settings import Settings
 
@@ -33,7 +33,8 @@ class Run:
         if checkpoint.latest(folder) is not None:
             self.learner = checkpoint.restore_learner(folder, self.learner)
         self.update = int(self.learner.update)
-        self.metrics_file = progress.MetricsFile(folder, self.agent_steps)
+        self.metrics_file = metrics.MetricsFile(folder, self.agent_steps)
+        self.logs = [self.metrics_file]
         self.terminal_error = None
 
     @property
@@ -57,6 +58,17 @@ class Run:
         )
         if self.update:
             print(f"resumed at {self.agent_steps:,} agent steps")
+
+    def write_events(self) -> None:
+        """Write TensorBoard's event file, too.
+
+        Raises:
+            ImportError: tensorboardX is not installed.
+            FolderError: it cannot be written.
+        """
+        from attjax import tensorboard
+
+        self.logs.append(tensorboard.EventFile(self.folder, self.config, self.metrics_file.kept))
 
     def announce_longer(self, before: Settings) -> None:
         """Print what a larger total than ``before``'s changes from here on."""
@@ -106,18 +118,19 @@ class Run:
         while self.goes_on:
             count = min(self.settings.updates_per_block, self.settings.num_updates - self.update)
             try:
-                self.learner, metrics = train_block(self.env_params, self.learner, count)
+                self.learner, block = train_block(self.env_params, self.learner, count)
             except nan_search.NotFinite as found:
                 return self._divergence(self.update, count, str(found))
-            diverged = {name: int(update) for name, update in metrics["diverged"].items()}
+            diverged = {name: int(update) for name, update in block["diverged"].items()}
             if max(diverged.values()) >= 0:
                 first = min(update for update in diverged.values() if update >= 0)
                 names = ", ".join(name for name, update in diverged.items() if update == first)
                 return self._divergence(first, 1, names)
             self.update += count
-            row = progress.metrics_row(metrics, self.agent_steps, time.monotonic() - start)
+            row = metrics.block_row(block, self.agent_steps, time.monotonic() - start)
             self.terminal_error = row["terminal_error_deg"]
-            self.metrics_file.append(row)
+            for log in self.logs:
+                log.append(row)
             line.show(row)
             if time.monotonic() - saved > save_every_s:
                 saver.save(self.learner, self.terminal_error)
