@@ -1,56 +1,264 @@
-"""How a training run shows itself: a live line, or plain lines."""
+"""How a training run shows itself: a panel that redraws itself on a terminal, lines elsewhere."""
 
+import collections
+import math
 import time
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
 
-WIDTH_FOR_BAR = 100
+WINDOW_S = 60.0
+"""Speed and remaining time come from the blocks of so many seconds."""
+
+REDRAWS_PER_S = 2
+LEAST_PAUSE_S, PAUSE_SHARE = 5.0, 0.01
+"""Between two lines: so long, and that share of the time before; so a day makes some 600 lines."""
+
+EPISODE_COLUMN = (
+    ("return", "episode_return", ",.0f"),
+    ("success", "success_rate", ".1%"),
+    ("terminal error", "terminal_error_deg", ".3g"),
+)
+UPDATE_COLUMNS = (
+    (
+        ("entropy", "entropy", ".3g"),
+        ("KL", "approximate_kl", ".2g"),
+        ("clipped", "clip_fraction", ".1%"),
+    ),
+    (
+        ("value loss", "value_loss", ".3g"),
+        ("explained var.", "explained_variance", ".3g"),
+        ("overspeed", "overspeed_rate", ".1%"),
+    ),
+)
+"""What the panel shows: label, column of metrics.csv, format."""
+
+WIDTHS = (25, 16, 24)
+GAP = "  "
+MOST_TREND, LEAST_BAR = 24, 8
+LEVELS = "▁▂▃▄▅▆▇█"
+NONE_YET = "no whole episode has ended yet"
 
 
-class ProgressLine:
-    """A live progress line on a terminal, plain lines elsewhere; a context manager."""
+class Progress:
+    """Shows a run while it trains; a context manager.
 
-    def __init__(self, total_steps: int, done_steps: int):
-        self._total, self._start_steps = total_steps, done_steps
-        console = Console(highlight=False)
-        self._is_live = console.is_terminal
-        bar = [BarColumn(bar_width=None)] if console.width >= WIDTH_FOR_BAR else []
-        columns = [*bar, TextColumn("{task.fields[text]}")]
-        self._progress = Progress(*columns, console=console, expand=True)
-        self._task = self._progress.add_task(
-            "", total=total_steps, completed=done_steps, text="first block"
-        )
+    On a terminal it is a panel of four lines, whose last state stays. Elsewhere it prints a line
+    for the first and the last block, and between them not more often than is read.
+
+    Args:
+        total_steps: agent steps of the whole run.
+        done_steps: those done before; the clock starts when the context is entered.
+        rows: of metrics.csv, of a run that goes on.
+        stop: has ``received``, not None once the run has been asked to stop.
+    """
+
+    def __init__(self, total_steps: int, done_steps: int, rows=(), stop=None):
+        self._status = Status(total_steps, done_steps)
+        for row in rows:
+            self._status.learn({name: float(cell) for name, cell in row.items() if cell})
+        self._stop, self._console = stop, Console(highlight=False)
+        # Not for rich alone to say: it also takes a log for a terminal where FORCE_COLOR is set.
+        self._is_live = self._console.is_interactive and self._console.file.isatty()
+        self._live = Live(self, console=self._console, refresh_per_second=REDRAWS_PER_S)
+        self._is_shown, self._next_line = True, 0.0
 
     def __enter__(self):
         self._start = time.monotonic()
+        self._status.start(self._start)
         if self._is_live:
-            self._progress.start()
+            self._live.start()
+            # A process that is killed at once could not bring a hidden cursor back.
+            self._console.show_cursor(True)
         return self
 
-    def __exit__(self, *exception):
+    def __exit__(self, *_):
         if self._is_live:
-            self._progress.stop()
+            self._live.stop()
+        elif not self._is_shown:
+            self._print()
 
     def show(self, row: dict) -> None:
         """Show a row of metrics."""
-        steps, elapsed = row["agent_steps"], time.monotonic() - self._start
-        rate = (steps - self._start_steps) / max(elapsed, 1e-9)
-        minutes, seconds = divmod(round((self._total - steps) / rate), 60)
-        text = (
-            f"{steps / 1e6:.3g}/{self._total / 1e6:.3g}M steps {_thousands(rate)}/s "
-            f"ETA {minutes}:{seconds:02}  return {_number(row['episode_return'], '.0f')} "
-            f"success {_number(row['success_rate'], '.1%')} "
-            f"error {_number(row['terminal_error_deg'], '.3g')}°"
-        )
-        self._progress.update(self._task, completed=steps, text=text)
-        if not self._is_live:
-            print(text, flush=True)
+        now = time.monotonic()
+        self._status.add(row, now)
+        self._is_shown = False
+        if not self._is_live and now >= self._next_line:
+            self._print()
+            self._next_line = now + max(LEAST_PAUSE_S, PAUSE_SHARE * (now - self._start))
+
+    def _print(self):
+        print(line(self._status, time.monotonic()), file=self._console.file, flush=True)
+        self._is_shown = True
+
+    def __rich__(self):
+        is_stopping = self._stop is not None and self._stop.received is not None
+        return Panel(self._status, is_stopping)
 
 
-def _number(value, form):
-    return "–" if value is None else format(value, form)
+class Status:
+    """What the rows so far say of a run.
+
+    Attributes:
+        known: the newest value of each column that has had one.
+        history: all values, of the columns that the panel draws.
+    """
+
+    def __init__(self, total_steps: int, done_steps: int):
+        self.total, self.steps, self.known = total_steps, done_steps, {}
+        self.history = {name: [] for _, name, _ in EPISODE_COLUMN}
+        self._marks = collections.deque()
+
+    def start(self, now: float) -> None:
+        """Start the clock."""
+        self._marks.append((now, self.steps))
+
+    def add(self, row: dict, now: float) -> None:
+        """Take in a row of metrics."""
+        self.steps = row["agent_steps"]
+        self.learn({name: value for name, value in row.items() if value is not None})
+        self._marks.append((now, self.steps))
+        while self._marks[1][0] < now - WINDOW_S and len(self._marks) > 2:
+            self._marks.popleft()
+
+    def learn(self, values: dict) -> None:
+        """Take in what is not empty in a row."""
+        self.known |= values
+        for name in self.history.keys() & values.keys():
+            self.history[name].append(values[name])
+
+    def describe(self, now: float) -> str:
+        """Where it stands, how fast it is and how long it will take."""
+        (since, steps), (until, _) = self._marks[0], self._marks[-1]
+        speed = remaining = "–"
+        if self.steps > steps and until > since:
+            rate = (self.steps - steps) / (until - since)
+            speed = _short(rate)
+            remaining = _duration(max((self.total - self.steps) / rate - (now - until), 0))
+        done = f"{self.steps / self.total:.1%}  {_short(self.steps)}/{_short(self.total)} steps"
+        return f"{done}  {speed}/s  ETA {remaining}"
 
 
-def _thousands(rate):
-    return f"{rate / 1e3:.0f}k" if rate >= 1e4 else f"{rate:.0f}"
+def line(status: Status, now: float) -> str:
+    """The run's state in a line; what is not known is left out."""
+    parts = [f"{status.describe(now):<44}"]
+    if "episodes" in status.known and "success_rate" not in status.known:
+        parts.append(NONE_YET)
+    for label, name, form in (*EPISODE_COLUMN, UPDATE_COLUMNS[0][0]):
+        if name in status.known:
+            parts.append(f"{label} {_value(status, name, form)}")
+    return "  ".join(parts)
+
+
+class Panel:
+    """The run's state in four lines, for rich; narrow terminals get less of it."""
+
+    def __init__(self, status: Status, is_stopping: bool = False):
+        self._status, self._is_stopping = status, is_stopping
+
+    def __rich_console__(self, console, options):
+        width = options.max_width - 2  # Ctrl-C shows as ^C at its end, which must not wrap
+        state = self._status.describe(time.monotonic())
+        if self._is_stopping:
+            state = state[: state.index("ETA")] + "stopping after this block"
+        yield _bar(self._status, state, width)
+        count = 1 + (width >= sum(WIDTHS[:2]) + len(GAP))
+        count += width >= sum(WIDTHS) + 2 * len(GAP)
+        free = width - sum(WIDTHS[:count]) - (count - 1) * len(GAP) - 1
+        trend = min(free, MOST_TREND) if options.encoding.startswith("utf") else 0
+        first = _episode_cells(self._status, max(trend, 0))
+        for row, text in enumerate(first):
+            for column, size in zip(UPDATE_COLUMNS[: count - 1], WIDTHS[1:]):
+                text.append(GAP)
+                text.append_text(_cell(self._status, column[row], size))
+            text.truncate(width)
+            yield text
+
+
+def _bar(status, state, width):
+    text = _text(state)
+    text.truncate(width)
+    if width < len(state) + LEAST_BAR + 2:
+        return text
+    bar = ProgressBar(status.total, min(status.steps, status.total), width - len(state) - 2)
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    grid.add_row(bar, text)
+    return grid
+
+
+def _episode_cells(status, trend_width):
+    if "success_rate" not in status.known:
+        width = WIDTHS[0] + (trend_width + 1 if trend_width else 0)
+        words = ("no whole episode", "has ended yet", "")
+        if "episodes" not in status.known:
+            words = ("the first block runs", "", "")
+        yield from (_text(word.ljust(width)) for word in words)
+        return
+    for entry in EPISODE_COLUMN:
+        text = _cell(status, entry, WIDTHS[0])
+        if trend_width:
+            text.append(" " + trend(status.history[entry[1]], trend_width), "cyan")
+        yield text
+
+
+def _cell(status, entry, width):
+    label, name, form = entry
+    value = _value(status, name, form)
+    return _text(label, "dim").append(value.rjust(width - len(label)))
+
+
+def _text(content, style=""):
+    return Text(no_wrap=True, overflow="crop").append(content, style)
+
+
+def trend(values: list[float], width: int) -> str:
+    """The values over the whole run as ``width`` blocks, from the least to the greatest.
+
+    Positive values that span a factor of ten or more are drawn by their logarithm.
+
+    Example:
+        >>> trend([1, 2, 3, 4, 5, 6, 7, 8], 4)
+        '▁▃▅█'
+    """
+    values = [x for x in values if math.isfinite(x)]
+    count = min(width, len(values))
+    shown = [values[(i + 1) * len(values) // count - 1] for i in range(count)]
+    if shown and min(shown) > 0 and max(shown) >= 10 * min(shown):
+        shown = [math.log(x) for x in shown]
+    low, high = min(shown, default=0), max(shown, default=0)
+    scale = (len(LEVELS) - 1) / (high - low) if high > low else 0
+    return "".join(LEVELS[int((x - low) * scale)] for x in shown).ljust(width)
+
+
+def _value(status, name, form):
+    unit = "°" if name.endswith("_deg") else ""
+    return format(status.known[name], form) + unit if name in status.known else "–"
+
+
+def _short(x):
+    """Three digits and a unit.
+
+    Example:
+        >>> [_short(x) for x in (256, 999_900, 40_000_000)]
+        ['256', '1M', '40M']
+    """
+    for scale, unit in ((1, ""), (1e3, "k"), (1e6, "M"), (1e9, "G")):
+        text = f"{x / scale:.3g}"
+        if float(text) < 1000:
+            return text + unit
+    return f"{x / 1e12:.3g}T"
+
+
+def _duration(seconds):
+    """Hours, minutes and seconds.
+
+    Example:
+        >>> _duration(59.7), _duration(3723)
+        ('1:00', '1:02:03')
+    """
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"

@@ -89,9 +89,10 @@ class Run:
         """
         train_block = self._compiled(debug_nans) if self.goes_on else None
         total = self.settings.num_updates * self.settings.steps_per_update
+        rows = self.metrics_file.kept
         with checkpoint.Saver(self.folder) as saver:
-            with progress.ProgressLine(total, self.agent_steps) as line:
-                diverged = self._loop(train_block, saver, line, save_every_s)
+            with progress.Progress(total, self.agent_steps, rows, self.stop) as view:
+                diverged = self._loop(train_block, saver, view, save_every_s)
             if diverged:
                 print(f"train.py: error: {diverged}", file=sys.stderr)
                 return DIVERGED
@@ -112,7 +113,7 @@ class Run:
         print(f"compiled in {time.monotonic() - start:.1f} s", flush=True)
         return train_block
 
-    def _loop(self, train_block, saver, line, save_every_s):
+    def _loop(self, train_block, saver, view, save_every_s):
         """Run blocks until the end or a signal; returns what diverged, if anything."""
         start, saved = time.monotonic() - self.metrics_file.wall_s, time.monotonic()
         while self.goes_on:
@@ -131,7 +132,7 @@ class Run:
             self.terminal_error = row["terminal_error_deg"]
             for log in self.logs:
                 log.append(row)
-            line.show(row)
+            view.show(row)
             if time.monotonic() - saved > save_every_s:
                 saver.save(self.learner, self.terminal_error)
                 saved = time.monotonic()
