@@ -2,10 +2,11 @@
 
 import dataclasses
 import json
+import textwrap
 import tomllib
 from pathlib import Path
 
-from attjax import presets, settings
+from attjax import help_text, presets, settings
 from attjax.cli import UserError
 from attjax.run_folder import Config
 
@@ -45,15 +46,23 @@ def read(path: Path) -> dict:
 
 
 def text(config: Config) -> str:
-    """The file that reproduces a run.
+    """The file that reproduces a run, in ASCII, with a comment for each setting.
 
     Example:
         >>> text(Config("paper", 3, presets.PAPER)).splitlines()[:2]
         ['preset = "paper"', 'seed = 3']
     """
     lines = [f'preset = "{config.preset}"', f"seed = {config.seed}", "", "[settings]"]
-    for name, field in SETTINGS.items():
-        value = getattr(config.settings, name)
-        shown = json.dumps(list(value) if isinstance(value, tuple) else value)
-        lines += [f"# {field.metadata['help']}", f"{name} = {shown}"]
-    return "\n".join(lines) + "\n"
+    for group, title in settings.GROUPS.items():
+        lines += ["", f"# --- {title} ---"]
+        for name, field in SETTINGS.items():
+            if field.metadata["group"] == group:
+                value = getattr(config.settings, name)
+                shown = json.dumps(list(value) if isinstance(value, tuple) else value)
+                lines += [*_comment(field), f"{name} = {shown}"]
+    return help_text.plain("\n".join(lines)) + "\n"
+
+
+def _comment(field):
+    described = "; ".join(filter(None, (help_text.meaning(field), settings.limits(field))))
+    return textwrap.wrap(described, 100, initial_indent="# ", subsequent_indent="# ")
