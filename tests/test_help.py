@@ -103,10 +103,10 @@ def test_training_and_evaluating_print_in_ascii(tmp_path):
     folder = ["--checkpoint", tmp_path / "run", "--max-episode-steps", "20"]
     done = run("train.py", *TINY, *total, *folder, env=environment)
     assert done.returncode == 0 and done.stderr == "", done.stderr
-    assert " deg  entropy" in done.stdout
+    assert "deg  entropy" in done.stdout
     few = ["--device", "cpu", "--episodes", "2", "--duration", "1"]
     done = run("eval.py", *few, *folder[:2], env=environment)
-    assert done.returncode == 0 and "phi (deg)" in done.stdout.replace("  deg", " deg"), done.stdout
+    assert done.returncode == 0 and "phi (deg)" in done.stdout, done.stderr
     done = run("eval.py", *few, *folder[:2], "--compare", env=environment)
     assert done.returncode == 0, done.stderr
 
