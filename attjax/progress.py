@@ -1,14 +1,12 @@
 """How a training run shows itself: a panel that redraws itself on a terminal, lines elsewhere."""
 
 import collections
-import math
 import time
 
 from rich.console import Console
 from rich.live import Live
-from rich.progress_bar import ProgressBar
-from rich.table import Table
-from rich.text import Text
+
+from attjax import panel
 
 WINDOW_S = 60.0
 """Speed and remaining time come from the blocks of so many seconds."""
@@ -17,29 +15,6 @@ REDRAWS_PER_S = 2
 LEAST_PAUSE_S, PAUSE_SHARE = 5.0, 0.01
 """Between two lines: so long, and that share of the time before; so a day makes some 600 lines."""
 
-EPISODE_COLUMN = (
-    ("return", "episode_return", ",.0f"),
-    ("success", "success_rate", ".1%"),
-    ("terminal error", "terminal_error_deg", ".3g"),
-)
-UPDATE_COLUMNS = (
-    (
-        ("entropy", "entropy", ".3g"),
-        ("KL", "approximate_kl", ".2g"),
-        ("clipped", "clip_fraction", ".1%"),
-    ),
-    (
-        ("value loss", "value_loss", ".3g"),
-        ("explained var.", "explained_variance", ".3g"),
-        ("overspeed", "overspeed_rate", ".1%"),
-    ),
-)
-"""What the panel shows: label, column of metrics.csv, format."""
-
-WIDTHS = (25, 16, 24)
-GAP = "  "
-MOST_TREND, LEAST_BAR = 24, 8
-LEVELS = "▁▂▃▄▅▆▇█"
 NONE_YET = "no whole episode has ended yet"
 
 
@@ -96,7 +71,7 @@ class Progress:
 
     def __rich__(self):
         is_stopping = self._stop is not None and self._stop.received is not None
-        return Panel(self._status, is_stopping)
+        return panel.Panel(self._status, is_stopping)
 
 
 class Status:
@@ -109,7 +84,7 @@ class Status:
 
     def __init__(self, total_steps: int, done_steps: int):
         self.total, self.steps, self.known = total_steps, done_steps, {}
-        self.history = {name: [] for _, name, _ in EPISODE_COLUMN}
+        self.history = {name: [] for _, name, _ in panel.EPISODE_COLUMN}
         self._marks = collections.deque()
 
     def start(self, now: float) -> None:
@@ -147,95 +122,10 @@ def line(status: Status, now: float) -> str:
     parts = [f"{status.describe(now):<44}"]
     if "episodes" in status.known and "success_rate" not in status.known:
         parts.append(NONE_YET)
-    for label, name, form in (*EPISODE_COLUMN, UPDATE_COLUMNS[0][0]):
+    for label, name, form in (*panel.EPISODE_COLUMN, panel.UPDATE_COLUMNS[0][0]):
         if name in status.known:
-            parts.append(f"{label} {_value(status, name, form)}")
+            parts.append(f"{label} {panel.value(status, name, form)}")
     return "  ".join(parts)
-
-
-class Panel:
-    """The run's state in four lines, for rich; narrow terminals get less of it."""
-
-    def __init__(self, status: Status, is_stopping: bool = False):
-        self._status, self._is_stopping = status, is_stopping
-
-    def __rich_console__(self, console, options):
-        width = options.max_width - 2  # Ctrl-C shows as ^C at its end, which must not wrap
-        state = self._status.describe(time.monotonic())
-        if self._is_stopping:
-            state = state[: state.index("ETA")] + "stopping after this block"
-        yield _bar(self._status, state, width)
-        count = 1 + (width >= sum(WIDTHS[:2]) + len(GAP))
-        count += width >= sum(WIDTHS) + 2 * len(GAP)
-        free = width - sum(WIDTHS[:count]) - (count - 1) * len(GAP) - 1
-        trend = min(free, MOST_TREND) if options.encoding.startswith("utf") else 0
-        first = _episode_cells(self._status, max(trend, 0))
-        for row, text in enumerate(first):
-            for column, size in zip(UPDATE_COLUMNS[: count - 1], WIDTHS[1:]):
-                text.append(GAP)
-                text.append_text(_cell(self._status, column[row], size))
-            text.truncate(width)
-            yield text
-
-
-def _bar(status, state, width):
-    text = _text(state)
-    text.truncate(width)
-    if width < len(state) + LEAST_BAR + 2:
-        return text
-    bar = ProgressBar(status.total, min(status.steps, status.total), width - len(state) - 2)
-    grid = Table.grid(padding=(0, 2, 0, 0))
-    grid.add_row(bar, text)
-    return grid
-
-
-def _episode_cells(status, trend_width):
-    if "success_rate" not in status.known:
-        width = WIDTHS[0] + (trend_width + 1 if trend_width else 0)
-        words = ("no whole episode", "has ended yet", "")
-        if "episodes" not in status.known:
-            words = ("the first block runs", "", "")
-        yield from (_text(word.ljust(width)) for word in words)
-        return
-    for entry in EPISODE_COLUMN:
-        text = _cell(status, entry, WIDTHS[0])
-        if trend_width:
-            text.append(" " + trend(status.history[entry[1]], trend_width), "cyan")
-        yield text
-
-
-def _cell(status, entry, width):
-    label, name, form = entry
-    value = _value(status, name, form)
-    return _text(label, "dim").append(value.rjust(width - len(label)))
-
-
-def _text(content, style=""):
-    return Text(no_wrap=True, overflow="crop").append(content, style)
-
-
-def trend(values: list[float], width: int) -> str:
-    """The values over the whole run as ``width`` blocks, from the least to the greatest.
-
-    Positive values that span a factor of ten or more are drawn by their logarithm.
-
-    Example:
-        >>> trend([1, 2, 3, 4, 5, 6, 7, 8], 4)
-        '▁▃▅█'
-    """
-    values = [x for x in values if math.isfinite(x)]
-    count = min(width, len(values))
-    shown = [values[(i + 1) * len(values) // count - 1] for i in range(count)]
-    if shown and min(shown) > 0 and max(shown) >= 10 * min(shown):
-        shown = [math.log(x) for x in shown]
-    low, high = min(shown, default=0), max(shown, default=0)
-    scale = (len(LEVELS) - 1) / (high - low) if high > low else 0
-    return "".join(LEVELS[int((x - low) * scale)] for x in shown).ljust(width)
-
-
-def _value(status, name, form):
-    unit = "°" if name.endswith("_deg") else ""
-    return format(status.known[name], form) + unit if name in status.known else "–"
 
 
 def _short(x):

@@ -20,7 +20,7 @@ LAYERS = [
     {"rollout", "descent"},
     {"ppo"},
     {"presets", "assembly", "run_folder", "nan_search"},
-    {"help_text"},
+    {"help_text", "panel"},
     {"progress", "metrics", "report", "cli", "flight_policy"},
     {"checkpoint", "config_file", "tensorboard"},
     {"training", "plots", "export_c", "export_onnx", "export_stablehlo"},
