@@ -1,11 +1,4 @@
-"""Judge a trained attitude controller over random slews, as in the paper's Table 2.
-
-Example:
-    python eval.py --checkpoint ckpt/
-    python eval.py --checkpoint ckpt/ --frameskip 20 --json result.json
-    python eval.py --controller phase-plane
-    python eval.py --checkpoint ckpt/ --compare
-"""
+"""Judge an attitude controller over random slews, as in the paper's Table 2."""
 
 import dataclasses
 import json
@@ -13,43 +6,67 @@ import sys
 import time
 from pathlib import Path
 
-from attjax import cli, config_file, run_folder
+from attjax import cli, config_file, help_text, run_folder
 from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
 
 POLICY = "policy"
 CLASSICAL = ("phase-plane", "feedback")
+USAGE = "eval.py [--checkpoint FOLDER | --controller NAME] [--compare] [FLAG ...]"
+EXAMPLES = """\
+examples:
+  python eval.py --checkpoint ckpt/                 5,000 slews at 40 Hz
+  python eval.py --checkpoint ckpt/ --frameskip 20  the same at 11.43 Hz
+  python eval.py --checkpoint ckpt/ --compare       beside the classical ones
+  python eval.py --checkpoint ckpt/ --json result.json --plot figures/
+  python eval.py --controller phase-plane           needs no checkpoint
+"""
 
 
 def parse_arguments(argv):
-    parser = cli.Parser(prog="eval.py", description=__doc__)
-    cli.add_common(parser, seed_help="of the initial slews (default: 0)")
-    who = parser.add_mutually_exclusive_group()
+    parser = cli.Parser(prog="eval.py", usage=USAGE, description=__doc__, epilog=EXAMPLES)
+    _add_who(parser.add_argument_group("what to evaluate"))
+    _add_conditions(parser.add_argument_group("conditions, the same for all controllers"))
+    _add_output(parser.add_argument_group("output"))
+    return parser.parse_args(argv)
+
+
+def _add_who(group):
+    cli.add_checkpoint(group)
+    best_help = "the checkpoint with the least terminal error in training, not the newest"
+    group.add_argument("--best", action="store_true", help=best_help)
+    who = group.add_mutually_exclusive_group()
     controller_help = "the trained policy (default), or a classical controller, without checkpoint"
     who.add_argument(
         "--controller", choices=(POLICY, *CLASSICAL), default=POLICY, help=controller_help
     )
     compare_help = "policy, classical controllers and the paper side by side, on the same slews"
     who.add_argument("--compare", action="store_true", help=compare_help)
-    best_help = "the checkpoint with the least terminal error in training, not the newest"
-    parser.add_argument("--best", action="store_true", help=best_help)
-    cli.add_number(parser, "episodes", int, 5000, "number of slews", low=1, high=10**7)
-    frameskip_help = "RK4 steps after the first of a decision; the control rate is 240/(N + 1) Hz"
-    cli.add_number(parser, "frameskip", int, 5, frameskip_help, low=0, below=10_500)
+
+
+def _add_conditions(group):
+    cli.add_number(group, "episodes", int, 5000, "number of random slews", low=1, high=10**7)
+    frameskip_help = "RK4 steps of 1/240 s after the first of a decision, for 240/(N + 1) Hz"
+    cli.add_number(group, "frameskip", int, 5, frameskip_help, low=0, below=10_500)
     craft_help = (
         "TOML file of the spacecraft that flies (default: the one that the policy was trained on; "
         "LM50 for a classical controller)"
     )
-    parser.add_argument("--spacecraft", type=Path, metavar="FILE", help=craft_help)
-    duration_help = "length of an episode, s (default: the spacecraft's; LM50's is 43.75)"
-    cli.add_number(parser, "duration", float, None, duration_help, above=0, high=MOST_DURATION)
+    group.add_argument("--spacecraft", type=Path, metavar="FILE", help=craft_help)
+    duration_help = "length of an episode (default: the spacecraft's; LM50's is 43.75)"
+    limits = {"above": 0, "high": MOST_DURATION}
+    cli.add_number(group, "duration", float, None, duration_help, unit="s", **limits)
+    cli.add_seed_and_device(group, "seed of the initial slews")
+
+
+def _add_output(group):
+    group.add_argument("--json", type=Path, metavar="FILE", help="also write the statistics here")
     plot_help = "also draw figures into this folder (needs the extra plot)"
-    parser.add_argument("--plot", type=Path, metavar="FOLDER", help=plot_help)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the statistics here")
-    return parser.parse_args(argv)
+    group.add_argument("--plot", type=Path, metavar="FOLDER", help=plot_help)
 
 
 def main(argv=None) -> int:
     """Evaluate a checkpoint or a classical controller; returns the exit status."""
+    help_text.print_anywhere()
     arguments = parse_arguments(argv)
     advice = "fewer --episodes take less"
     with cli.one_line_errors("eval.py", run_folder.FolderError), cli.enough_memory(advice):
@@ -98,9 +115,9 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics):
 
 def _metrics(folder):
     """The rows of the run's metrics.csv, for the learning curve."""
-    from attjax import progress
+    from attjax import metrics
 
-    return progress.read_rows(folder / run_folder.METRICS)
+    return metrics.read_rows(folder / run_folder.METRICS)
 
 
 def _prepare_plots(folder):

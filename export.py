@@ -1,38 +1,49 @@
-"""Write a trained attitude controller for flight software: C99, ONNX or StableHLO.
-
-Example:
-    python export.py --checkpoint pretrained/precise --format c --out flight/
-    python export.py --checkpoint ckpt/ --best --frameskip 20 --format onnx --out flight/
-"""
+"""Write a trained attitude controller for flight software: C99, ONNX or StableHLO."""
 
 import importlib
 import sys
 from pathlib import Path
 
-from attjax import cli, run_folder
+from attjax import cli, help_text, run_folder
 
 FORMATS = {"c": "export_c", "onnx": "export_onnx", "stablehlo": "export_stablehlo"}
 NEEDED = {"export_onnx": "onnx", "export_stablehlo": "flatbuffers"}
+USAGE = "export.py --format FORMAT --out FOLDER [--checkpoint FOLDER] [FLAG ...]"
+EXAMPLES = """\
+examples:
+  python export.py --checkpoint pretrained/precise --format c --out flight/
+  python export.py --checkpoint ckpt/ --best --format onnx --out flight/
+"""
 
 
 def parse_arguments(argv):
-    parser = cli.Parser(prog="export.py", description=__doc__)
-    cli.add_common(parser, seed_help="of the slews that test vectors come from (default: 0)")
-    best_help = "the checkpoint with the least terminal error in training, not the newest"
-    parser.add_argument("--best", action="store_true", help=best_help)
-    format_help = "c: C99, with a test program; onnx (needs the extra onnx); stablehlo (likewise)"
-    parser.add_argument("--format", choices=FORMATS, required=True, help=format_help)
-    out_help = "folder to write into"
-    parser.add_argument("--out", type=Path, metavar="FOLDER", required=True, help=out_help)
-    frameskip_help = "control rate of the flight software, 240/(N + 1) Hz"
-    cli.add_number(parser, "frameskip", int, 5, frameskip_help, low=0, below=10_500)
-    overwrite_help = "replace files that an export wrote before"
-    parser.add_argument("--overwrite", action="store_true", help=overwrite_help)
+    parser = cli.Parser(prog="export.py", usage=USAGE, description=__doc__, epilog=EXAMPLES)
+    _add_what(parser.add_argument_group("what to export"))
+    _add_output(parser.add_argument_group("output"))
     return parser.parse_args(argv)
+
+
+def _add_what(group):
+    cli.add_checkpoint(group)
+    best_help = "the checkpoint with the least terminal error in training, not the newest"
+    group.add_argument("--best", action="store_true", help=best_help)
+    frameskip_help = "control rate of the flight software, 240/(N + 1) Hz"
+    cli.add_number(group, "frameskip", int, 5, frameskip_help, low=0, below=10_500)
+    cli.add_seed_and_device(group, "seed of the slews that test vectors come from")
+
+
+def _add_output(group):
+    format_help = "c: C99, with a test program; onnx and stablehlo need the extra onnx"
+    group.add_argument("--format", choices=FORMATS, required=True, help=format_help)
+    out_help = "folder to write into"
+    group.add_argument("--out", type=Path, metavar="FOLDER", required=True, help=out_help)
+    overwrite_help = "replace files that an export wrote before"
+    group.add_argument("--overwrite", action="store_true", help=overwrite_help)
 
 
 def main(argv=None) -> int:
     """Export a checkpoint; returns the exit status."""
+    help_text.print_anywhere()
     arguments = parse_arguments(argv)
     with cli.one_line_errors("export.py", run_folder.FolderError):
         cli.select_device(arguments.device)

@@ -1,46 +1,69 @@
-"""Train a neural attitude controller.
-
-Example:
-    python train.py --num-envs 2048
-    python train.py --preset paper-fast --checkpoint runs/fast
-"""
+"""Train a neural attitude controller by PPO, in a vectorised simulator."""
 
 import dataclasses
+import importlib
 import sys
 from pathlib import Path
 
-from attjax import cli, config_file, presets, run_folder
+from attjax import cli, config_file, help_text, presets, run_folder, settings
 from attjax.specification import LM50
 
 DEFAULT_PRESET = "precise"
+USAGE = "train.py [--preset NAME] [--checkpoint FOLDER] [--resume] [FLAG ...]"
+EXAMPLES = """\
+An agent step is an impulse and the free rotation after it. Symbols, equations
+and tables are the paper's; λ is that of generalised advantage estimation.
+
+examples:
+  python train.py                             the default preset, into ckpt/
+  python train.py --resume                    after Ctrl-C or a crash
+  python train.py --preset paper-fast --checkpoint runs/fast
+  python train.py --hidden-sizes 128,128 --seed 1 --checkpoint runs/wide
+  python train.py --preset paper --print-config > run.toml
+  python train.py --config run.toml --checkpoint runs/paper
+  python train.py --spacecraft mine.toml --checkpoint runs/mine
+"""
 
 
 def parse_arguments(argv):
-    parser = cli.Parser(prog="train.py", description=__doc__)
-    parser.add_argument(
-        "--preset", choices=presets.PRESETS, help=f"the recipe (default: {DEFAULT_PRESET})"
-    )
-    cli.add_common(parser, seed_help="of everything random (default: 0)")
-    existing = parser.add_mutually_exclusive_group()
+    parser = cli.Parser(prog="train.py", usage=USAGE, description=__doc__, epilog=EXAMPLES)
+    groups = {name: parser.add_argument_group(title) for name, title in settings.GROUPS.items()}
+    preset_help = f"the recipe; flags override it (default: {DEFAULT_PRESET})"
+    groups["run"].add_argument("--preset", choices=presets.PRESETS, help=preset_help)
+    craft_help = "TOML file that describes the spacecraft and its task (default: LM50, the paper's)"
+    groups["task"].add_argument("--spacecraft", type=Path, metavar="FILE", help=craft_help)
+    for name, group in groups.items():
+        cli.add_settings(group, name)
+    _add_run(groups["run"])
+    _add_logging(groups["logging"])
+    return parser.parse_args(argv)
+
+
+def _add_run(group):
+    cli.add_checkpoint(group)
+    existing = group.add_mutually_exclusive_group()
     resume_help = "continue the folder's run, or start it if there is none"
     existing.add_argument("--resume", action="store_true", help=resume_help)
     existing.add_argument("--overwrite", action="store_true", help="replace the folder's run")
-    craft_help = "TOML file that describes the spacecraft and its task (default: LM50, the paper's)"
-    parser.add_argument("--spacecraft", type=Path, metavar="FILE", help=craft_help)
-    save_help = "seconds between two checkpoints"
-    cli.add_number(parser, "save-every", float, 30.0, save_help, low=0)
-    debug_help = "check every operation, and name the first that makes a NaN (slow)"
-    parser.add_argument("--debug-nans", action="store_true", help=debug_help)
+    cli.add_seed_and_device(group, "seed of everything random")
     config_help = "TOML file with preset, seed, [settings] and [spacecraft]; flags override it"
-    parser.add_argument("--config", type=Path, metavar="FILE", help=config_help)
+    group.add_argument("--config", type=Path, metavar="FILE", help=config_help)
     print_help = "print the file that reproduces this run, and end"
-    parser.add_argument("--print-config", action="store_true", help=print_help)
-    cli.add_settings(parser)
-    return parser.parse_args(argv)
+    group.add_argument("--print-config", action="store_true", help=print_help)
+
+
+def _add_logging(group):
+    save_help = "time between two checkpoints"
+    cli.add_number(group, "save-every", float, 30.0, save_help, unit="s", low=0)
+    tensorboard_help = "also write TensorBoard's event files, into FOLDER/tensorboard"
+    group.add_argument("--tensorboard", action="store_true", help=tensorboard_help)
+    debug_help = "check every operation, and name the first that makes a NaN (slow)"
+    group.add_argument("--debug-nans", action="store_true", help=debug_help)
 
 
 def main(argv=None) -> int:
     """Run a training; returns the exit status."""
+    help_text.print_anywhere()
     arguments = parse_arguments(argv)
     with cli.one_line_errors("train.py", ValueError):
         given = _given(arguments)
@@ -49,12 +72,25 @@ def main(argv=None) -> int:
         print(config_file.text(new), end="")
         return 0
     with cli.StopSignals() as stop, cli.one_line_errors("train.py", run_folder.FolderError):
+        if arguments.tensorboard:
+            _check_tensorboard()
         device = cli.select_device(arguments.device)
         advice = "fewer --num-envs or a shorter --rollout-length take less"
         with run_folder.opened(arguments.checkpoint), cli.enough_memory(advice):
             run = _open(arguments, given, new, stop)
+            if arguments.tensorboard:
+                run.write_events()
             run.describe(device)
             return run.train(arguments.save_every, arguments.debug_nans)
+
+
+def _check_tensorboard():
+    """Fail before anything is written."""
+    try:
+        importlib.import_module("tensorboardX")
+    except ImportError:
+        needed = "--tensorboard needs tensorboardX: pip install 'attjax[tensorboard]'"
+        raise cli.UserError(needed) from None
 
 
 def _given(arguments):

@@ -9,7 +9,7 @@ import signal
 import sys
 from pathlib import Path
 
-from attjax import presets, settings, user_functions
+from attjax import help_text, settings, user_functions
 
 DEVICES = ("auto", "cpu", "gpu")
 BAD_INPUT = 2
@@ -23,9 +23,7 @@ class Parser(argparse.ArgumentParser):
     """An argument parser whose errors are one line, and exit status 2."""
 
     def __init__(self, **options):
-        super().__init__(
-            allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **options
-        )
+        super().__init__(allow_abbrev=False, formatter_class=help_text.Formatter, **options)
 
     def error(self, message: str):
         """Print the message as one line and exit."""
@@ -83,39 +81,42 @@ class StopSignals:
             signal.signal(each, signal.SIG_DFL)
 
 
-def add_common(parser: argparse.ArgumentParser, seed_help: str) -> None:
-    """Add --checkpoint, --seed and --device."""
+def add_checkpoint(group) -> None:
+    """Add --checkpoint."""
     folder_help = "folder of the training run (default: ckpt)"
-    parser.add_argument(
+    group.add_argument(
         "--checkpoint", type=Path, default=Path("ckpt"), metavar="FOLDER", help=folder_help
     )
-    add_number(parser, "seed", int, None, seed_help, low=0, below=2**32)
+
+
+def add_seed_and_device(group, seed_help: str) -> None:
+    """Add --seed and --device."""
+    add_number(group, "seed", int, None, f"{seed_help} (default: 0)", low=0, below=2**32)
     device_help = "where to compute (default: auto, a GPU if JAX finds one)"
-    parser.add_argument("--device", choices=DEVICES, default="auto", help=device_help)
+    group.add_argument("--device", choices=DEVICES, default="auto", help=device_help)
 
 
-def add_number(parser, name: str, kind: type, default, help: str, **limits) -> None:
-    """Add the flag of a number with limits, as in :func:`attjax.settings.setting`."""
-    field = settings.single(name, kind, help, **limits)
-    parser.add_argument(
+def add_number(group, name: str, kind: type, default, help: str, **details) -> None:
+    """Add the flag of a number with details as in :func:`attjax.settings.setting`."""
+    field = settings.single(name, kind, help, **details)
+    help = help_text.meaning(field)
+    group.add_argument(
         "--" + name,
         type=_parser_of(field),
         default=default,
         metavar={int: "N", float: "X"}[kind],
-        help=help if default is None else f"{help} (default: {default})",
+        help=help if default is None else f"{help} (default: {help_text.show(default)})",
     )
 
 
-def add_settings(parser: argparse.ArgumentParser) -> None:
-    """Add a flag for every setting; those not given are left out of the namespace."""
-    group = parser.add_argument_group("settings (defaults depend on the preset)")
+def add_settings(group, name: str) -> None:
+    """Add a flag for every setting of a group; those not given are left out of the namespace."""
     for field in dataclasses.fields(settings.Settings):
+        if field.metadata["group"] != name:
+            continue
         flag = "--" + field.name.replace("_", "-")
-        defaults = ", ".join(
-            f"{name} {_show(getattr(preset, field.name))}"
-            for name, preset in presets.PRESETS.items()
-        )
-        options = {"default": argparse.SUPPRESS, "help": f"{field.metadata['help']} ({defaults})"}
+        text = f"{help_text.meaning(field)} ({help_text.defaults(field.name)})"
+        options = {"default": argparse.SUPPRESS, "help": text}
         if field.type is bool:
             group.add_argument(flag, action=argparse.BooleanOptionalAction, **options)
         else:
@@ -142,14 +143,6 @@ def _parse(field, text):
         settings.check(field, value)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-    return value
-
-
-def _show(value):
-    if isinstance(value, tuple):
-        return ",".join(map(str, value))
-    if isinstance(value, bool):
-        return "yes" if value else "no"
     return value
 
 

@@ -3,10 +3,11 @@
 import contextlib
 import dataclasses
 import json
+import textwrap
 import tomllib
 from pathlib import Path
 
-from attjax import presets, settings, specification
+from attjax import help_text, presets, settings, specification
 from attjax.cli import UserError
 from attjax.run_folder import Config
 from attjax.specification import Spacecraft
@@ -67,21 +68,32 @@ def _one_line(what):
 
 
 def text(config: Config) -> str:
-    """The file that reproduces a run.
+    """The file that reproduces a run, in ASCII, with a comment for each setting.
 
     Example:
         >>> text(Config("paper", 3, presets.PAPER)).splitlines()[:2]
         ['preset = "paper"', 'seed = 3']
     """
     lines = [f'preset = "{config.preset}"', f"seed = {config.seed}", "", "[settings]"]
-    for name, field in SETTINGS.items():
-        value = getattr(config.settings, name)
-        lines += [f"# {field.metadata['help']}", f"{name} = {_toml(value)}"]
-    lines += ["", "[spacecraft]", "# kg m², N m, rad/s, degrees and s; body frame"]
+    for group, title in settings.GROUPS.items():
+        lines += ["", f"# --- {title} ---"]
+        for name, field in SETTINGS.items():
+            if field.metadata["group"] == group:
+                value = getattr(config.settings, name)
+                lines += [*_comment(field), f"{name} = {_toml(value)}"]
+    lines += ["", "[spacecraft]", "# kg m^2, N m, rad/s, degrees and s; body frame"]
     values = dataclasses.asdict(config.spacecraft)
     lines += [f"{name} = {_toml(value)}" for name, value in values.items()]
     return "\n".join(lines) + "\n"
 
 
+def _comment(field):
+    described = "; ".join(filter(None, (help_text.meaning(field), settings.limits(field))))
+    described = help_text.plain(described)
+    return textwrap.wrap(described, 100, initial_indent="# ", subsequent_indent="# ")
+
+
 def _toml(value):
-    return json.dumps(value, ensure_ascii=False)
+    """A value, in ASCII whatever the terminal; JSON's escapes of it would be no TOML's."""
+    shown = json.dumps(value, ensure_ascii=False)
+    return "".join(c if c.isascii() else f"\\U{ord(c):08x}" for c in shown)

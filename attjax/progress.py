@@ -1,150 +1,154 @@
-"""How a training run shows itself: a live line, or plain lines, and metrics.csv."""
+"""How a training run shows itself: a panel that redraws itself on a terminal, lines elsewhere."""
 
-import csv
-import io
+import collections
 import time
-from pathlib import Path
 
-import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.live import Live
 
-from attjax import run_folder
+from attjax import panel
 
-WIDTH_FOR_BAR = 100
-COLUMNS = (
-    "agent_steps", "wall_s", "episodes", "episode_return", "episode_return_std",
-    "episode_return_n", "success_rate", "overspeed_rate", "terminal_error_deg",
-    "entropy", "approximate_kl", "clip_fraction", "policy_loss", "value_loss",
-    "explained_variance",
-)  # fmt: skip
+WINDOW_S = 60.0
+"""Speed and remaining time come from the blocks of so many seconds."""
+
+REDRAWS_PER_S = 2
+LEAST_PAUSE_S, PAUSE_SHARE = 5.0, 0.01
+"""Between two lines: so long, and that share of the time before; so a day makes some 600 lines."""
+
+NONE_YET = "no whole episode has ended yet"
 
 
-def metrics_row(metrics: dict, agent_steps: int, wall_s: float) -> dict:
-    """One row of metrics.csv from what ``ppo.train_block`` returns.
+class Progress:
+    """Shows a run while it trains; a context manager.
 
-    Rates and the error are means over all episodes that ended; the return (Eq. 12–13) is
-    that of the slowest control rate, the paper's, as returns of several rates do not
-    compare. Cells are None where no episode ended.
+    On a terminal it is a panel of four lines, whose last state stays. Elsewhere it prints a line
+    for the first and the last block, and between them not more often than is read.
+
+    Args:
+        total_steps: agent steps of the whole run.
+        done_steps: those done before; the clock starts when the context is entered.
+        rows: of metrics.csv, of a run that goes on.
+        stop: has ``received``, not None once the run has been asked to stop.
     """
-    sums = {name: np.asarray(x, float) for name, x in metrics["episodes"].items()}
-    episodes, slowest = sums["episodes"].sum(), sums["episodes"][-1]
-    row = {"agent_steps": agent_steps, "wall_s": round(wall_s, 2), "episodes": int(episodes)}
-    for name in ("success_rate", "overspeed_rate", "terminal_error_deg"):
-        row[name] = sums[name].sum() / episodes if episodes else None
-    row["episode_return_n"] = int(slowest)
-    row["episode_return"] = row["episode_return_std"] = None
-    if slowest:
-        mean = sums["score"][-1] / slowest
-        variance = max(sums["score_squared"][-1] / slowest - mean**2, 0.0)
-        row |= {"episode_return": mean, "episode_return_std": variance**0.5}
-    return row | {name: float(x) for name, x in metrics["losses"].items()}
 
-
-class MetricsFile:
-    """Appends rows to metrics.csv; each is in the file when ``append`` returns."""
-
-    def __init__(self, folder: Path, resume_at: int):
-        """Open the file, dropping the rows after ``resume_at`` agent steps.
-
-        Raises:
-            FolderError: it cannot be read or written, or its rows are no rows of metrics.
-        """
-        self._folder, self._path = folder, folder / run_folder.METRICS
-        rows = [row for row in read_rows(self._path) if int(row["agent_steps"]) <= resume_at]
-        self.wall_s = float(rows[-1]["wall_s"]) if rows else 0.0
-        with run_folder.writing(folder):
-            run_folder.replace(self._path, _csv_text(rows, header=True))
-
-    def append(self, row: dict) -> None:
-        """Add one row.
-
-        Raises:
-            FolderError: it cannot be written.
-        """
-        with run_folder.writing(self._folder), self._path.open("a", newline="") as file:
-            file.write(_csv_text([{k: _cell(v) for k, v in row.items()}]))
-
-
-def read_rows(path: Path) -> list[dict]:
-    """The rows of a metrics.csv that need not exist; one that was cut off is left out.
-
-    Raises:
-        FolderError: they are no rows of metrics.
-    """
-    if not path.exists():
-        return []
-    try:
-        lines = path.read_text().splitlines(keepends=True)
-        rows = list(csv.DictReader(line for line in lines if line.endswith("\n")))
+    def __init__(self, total_steps: int, done_steps: int, rows=(), stop=None):
+        self._status = Status(total_steps, done_steps)
         for row in rows:
-            if set(row) != set(COLUMNS) or None in row.values():
-                raise ValueError(f"a row has other columns than {','.join(COLUMNS[:3])}...")
-            int(row["agent_steps"])
-            [float(cell) for cell in (row["wall_s"], *filter(None, row.values()))]
-    except (OSError, ValueError, csv.Error) as error:
-        raise run_folder.FolderError(
-            f"{path} cannot be read: {error}; without it, the run goes on and begins a new one"
-        ) from None
-    return rows
-
-
-def _cell(value):
-    return f"{value:.7g}" if isinstance(value, float) else value
-
-
-def _csv_text(rows, header=False):
-    text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
-    if header:
-        writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
-
-
-class ProgressLine:
-    """A live progress line on a terminal, plain lines elsewhere; a context manager."""
-
-    def __init__(self, total_steps: int, done_steps: int):
-        self._total, self._start_steps = total_steps, done_steps
-        console = Console(highlight=False)
-        self._is_live = console.is_terminal
-        bar = [BarColumn(bar_width=None)] if console.width >= WIDTH_FOR_BAR else []
-        columns = [*bar, TextColumn("{task.fields[text]}")]
-        self._progress = Progress(*columns, console=console, expand=True)
-        self._task = self._progress.add_task(
-            "", total=total_steps, completed=done_steps, text="first block"
-        )
+            self._status.learn({name: float(cell) for name, cell in row.items() if cell})
+        self._stop, self._console = stop, Console(highlight=False)
+        # Not for rich alone to say: it also takes a log for a terminal where FORCE_COLOR is set.
+        self._is_live = self._console.is_interactive and self._console.file.isatty()
+        self._live = Live(self, console=self._console, refresh_per_second=REDRAWS_PER_S)
+        self._is_shown, self._next_line = True, 0.0
 
     def __enter__(self):
         self._start = time.monotonic()
+        self._status.start(self._start)
         if self._is_live:
-            self._progress.start()
+            self._live.start()
+            # A process that is killed at once could not bring a hidden cursor back.
+            self._console.show_cursor(True)
         return self
 
-    def __exit__(self, *exception):
+    def __exit__(self, *_):
         if self._is_live:
-            self._progress.stop()
+            self._live.stop()
+        elif not self._is_shown:
+            self._print()
 
     def show(self, row: dict) -> None:
         """Show a row of metrics."""
-        steps, elapsed = row["agent_steps"], time.monotonic() - self._start
-        rate = (steps - self._start_steps) / max(elapsed, 1e-9)
-        minutes, seconds = divmod(round((self._total - steps) / rate), 60)
-        text = (
-            f"{steps / 1e6:.3g}/{self._total / 1e6:.3g}M steps {_thousands(rate)}/s "
-            f"ETA {minutes}:{seconds:02}  return {_number(row['episode_return'], '.0f')} "
-            f"success {_number(row['success_rate'], '.1%')} "
-            f"error {_number(row['terminal_error_deg'], '.3g')}°"
-        )
-        self._progress.update(self._task, completed=steps, text=text)
-        if not self._is_live:
-            print(text, flush=True)
+        now = time.monotonic()
+        self._status.add(row, now)
+        self._is_shown = False
+        if not self._is_live and now >= self._next_line:
+            self._print()
+            self._next_line = now + max(LEAST_PAUSE_S, PAUSE_SHARE * (now - self._start))
+
+    def _print(self):
+        print(line(self._status, time.monotonic()), file=self._console.file, flush=True)
+        self._is_shown = True
+
+    def __rich__(self):
+        is_stopping = self._stop is not None and self._stop.received is not None
+        return panel.Panel(self._status, is_stopping)
 
 
-def _number(value, form):
-    return "–" if value is None else format(value, form)
+class Status:
+    """What the rows so far say of a run.
+
+    Attributes:
+        known: the newest value of each column that has had one.
+        history: all values, of the columns that the panel draws.
+    """
+
+    def __init__(self, total_steps: int, done_steps: int):
+        self.total, self.steps, self.known = total_steps, done_steps, {}
+        self.history = {name: [] for _, name, _ in panel.EPISODE_COLUMN}
+        self._marks = collections.deque()
+
+    def start(self, now: float) -> None:
+        """Start the clock."""
+        self._marks.append((now, self.steps))
+
+    def add(self, row: dict, now: float) -> None:
+        """Take in a row of metrics."""
+        self.steps = row["agent_steps"]
+        self.learn({name: value for name, value in row.items() if value is not None})
+        self._marks.append((now, self.steps))
+        while self._marks[1][0] < now - WINDOW_S and len(self._marks) > 2:
+            self._marks.popleft()
+
+    def learn(self, values: dict) -> None:
+        """Take in what is not empty in a row."""
+        self.known |= values
+        for name in self.history.keys() & values.keys():
+            self.history[name].append(values[name])
+
+    def describe(self, now: float) -> str:
+        """Where it stands, how fast it is and how long it will take."""
+        (since, steps), (until, _) = self._marks[0], self._marks[-1]
+        speed = remaining = "–"
+        if self.steps > steps and until > since:
+            rate = (self.steps - steps) / (until - since)
+            speed = _short(rate)
+            remaining = _duration(max((self.total - self.steps) / rate - (now - until), 0))
+        done = f"{self.steps / self.total:.1%}  {_short(self.steps)}/{_short(self.total)} steps"
+        return f"{done}  {speed}/s  ETA {remaining}"
 
 
-def _thousands(rate):
-    return f"{rate / 1e3:.0f}k" if rate >= 1e4 else f"{rate:.0f}"
+def line(status: Status, now: float) -> str:
+    """The run's state in a line; what is not known is left out."""
+    parts = [f"{status.describe(now):<44}"]
+    if "episodes" in status.known and "success_rate" not in status.known:
+        parts.append(NONE_YET)
+    for label, name, form in (*panel.EPISODE_COLUMN, panel.UPDATE_COLUMNS[0][0]):
+        if name in status.known:
+            parts.append(f"{label} {panel.value(status, name, form)}")
+    return "  ".join(parts)
+
+
+def _short(x):
+    """Three digits and a unit.
+
+    Example:
+        >>> [_short(x) for x in (256, 999_900, 40_000_000)]
+        ['256', '1M', '40M']
+    """
+    for scale, unit in ((1, ""), (1e3, "k"), (1e6, "M"), (1e9, "G")):
+        text = f"{x / scale:.3g}"
+        if float(text) < 1000:
+            return text + unit
+    return f"{x / 1e12:.3g}T"
+
+
+def _duration(seconds):
+    """Hours, minutes and seconds.
+
+    Example:
+        >>> _duration(59.7), _duration(3723)
+        ('1:00', '1:02:03')
+    """
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"

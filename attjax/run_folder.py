@@ -1,4 +1,5 @@
-"""The folder of a training run: ``config.json``, ``metrics.csv``, a checkpoint a saved update.
+"""The folder of a training run: ``config.json``, ``metrics.csv``, a checkpoint a saved update,
+and ``tensorboard/`` where it was asked for.
 
 It belongs to one training process at a time. A process that is killed at any moment leaves a
 folder that ``--resume`` goes on from: files are replaced in one step, never edited in place.
@@ -23,6 +24,8 @@ except ImportError:  # Windows, where runs are not kept apart
 FORMAT = 5
 CONFIG, METRICS = "config.json", "metrics.csv"
 OWN_FILES = {CONFIG, METRICS, CONFIG + ".tmp", METRICS + ".tmp"}
+EVENTS, EVENT_FILE = "tensorboard", "events.out.tfevents.{}.attjax"
+EVENT_FILES = EVENT_FILE.format("*") + "*"  # a killed process may leave one that ends in .tmp
 
 
 class FolderError(Exception):
@@ -112,10 +115,12 @@ def create(folder: Path, config: Config, overwrite: bool) -> None:
                 )
             _read_json(folder / CONFIG)
             _remove_run(folder)
-        elif any(path.name not in OWN_FILES for path in folder.iterdir()):
+        elif not all(map(_is_own, folder.iterdir())):
             raise FolderError(
                 f"{folder} is not empty and holds no attjax run; choose another folder"
             )
+        else:
+            _remove_run(folder)
         write_config(folder, config)
 
 
@@ -174,6 +179,19 @@ def _read_json(path):
     return content
 
 
+def remove_events(folder: Path) -> None:
+    """Remove the event files that a run wrote; others in their folder stay."""
+    for path in (folder / EVENTS).glob(EVENT_FILES):
+        path.unlink()
+
+
+def _is_own(path):
+    """Whether nothing in it is of another program."""
+    if path.name != EVENTS:
+        return path.name in OWN_FILES
+    return path.is_dir() and all(inner.match(EVENT_FILES) for inner in path.iterdir())
+
+
 def _remove_run(folder):
     """Remove all but config.json, which a new one replaces in the end.
 
@@ -189,3 +207,7 @@ def _remove_run(folder):
             shutil.rmtree(removed)
         elif path.name in OWN_FILES - {CONFIG}:
             path.unlink()
+        elif path.name == EVENTS and path.is_dir():
+            remove_events(folder)
+            with contextlib.suppress(OSError):  # it holds other files, or is a link
+                path.rmdir()

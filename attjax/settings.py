@@ -4,6 +4,7 @@ This module imports nothing heavy, so that ``--help`` is instant.
 """
 
 import dataclasses
+import functools
 import math
 
 from attjax import user_functions
@@ -12,12 +13,33 @@ MOST_SAMPLES = 2**27
 """Of an update: some 100 GB."""
 
 
-def setting(help: str, **limits):
-    """A field without default. ``limits``: ``choices``, or ``low``, ``high`` (inclusive),
-    ``above`` and ``below`` (exclusive), of each element where the field is a tuple, and ``most``
-    elements. ``or_function``: a user's function will do, as ``module:function``.
+def setting(help: str, *, unit: str = "", symbol: str = "", group: str = "", **limits):
+    """A field without default.
+
+    Args:
+        help: what it means, in a line or two.
+        unit: of the number, where ``help`` does not say what it counts.
+        symbol: the paper's, or the literature's.
+        group: of ``GROUPS``.
+        limits: ``choices``, or ``low``, ``high`` (inclusive), ``above`` and ``below``
+            (exclusive), of each element where the field is a tuple, and ``most`` elements;
+            ``or_function``: a user's function will do, as ``module:function``.
     """
-    return dataclasses.field(metadata={"help": help, **limits})
+    return dataclasses.field(
+        metadata={"help": help, "unit": unit, "symbol": symbol, "group": group, **limits}
+    )
+
+
+GROUPS = {
+    "run": "run",
+    "task": "task",
+    "networks": "networks",
+    "ppo": "PPO",
+    "logging": "logging and debugging",
+}
+"""Titles of the groups of settings."""
+
+_run, _task, _networks, _ppo, _logging = (functools.partial(setting, group=g) for g in GROUPS)
 
 
 def single(name: str, kind: type, help: str, **limits) -> dataclasses.Field:
@@ -35,81 +57,93 @@ class Settings:
         ValueError: a value is out of its range, or two values do not fit together.
     """
 
-    # The task
-    frameskips: tuple[int, ...] = setting(
-        "torque-free RK4 steps after an impulse; the environments are shared out evenly "
-        "among several values",
+    total_steps: int = _run(
+        "agent steps in the whole run, rounded up to whole updates", low=1, high=10**13
+    )
+
+    frameskips: tuple[int, ...] = _task(
+        "torque-free RK4 steps of 1/240 s after an impulse, k of them for 240/(k + 1) Hz; the "
+        "spacecraft are shared out evenly among several values",
         low=0,
         below=10_500,
         most=64,
     )
-    reward: str = setting(
+    reward: str = _task(
         "Eq. 12-13 with terminal rewards, -log10 of the error angle, or module:function",
         choices=("paper", "logarithmic"),
         or_function=True,
     )
-    reward_scale: float = setting("factor on the reward the learner sees", above=0)
-    time_limit_terminates: bool = setting(
+    reward_scale: float = _task("factor on the reward the learner sees", above=0)
+    time_limit_terminates: bool = _task(
         "learn the time limit as an end, as the paper did; otherwise bootstrap there"
     )
-    max_episode_steps: int = setting(
-        "cap on an episode's agent steps in training, beside its 43.75 s", low=1, high=10_500
+    max_episode_steps: int = _task(
+        "cap on an episode's agent steps in training, beside its duration",
+        symbol="T",
+        low=1,
+        high=10_500,
     )
-    near_goal_share: float = setting(
+    near_goal_share: float = _task(
         "share of the training episodes that start near the goal, at any scale, and are short",
         low=0,
         below=1,
     )
-    near_goal_steps: int = setting("agent steps of such an episode", low=1, high=10_500)
-    stagger_episodes: bool = setting(
+    near_goal_steps: int = _task("agent steps of such a short episode", low=1, high=10_500)
+    stagger_episodes: bool = _task(
         "start the first episodes at random times, so that they do not end all at once"
     )
 
-    # The networks
-    features: str = setting(
+    features: str = _networks(
         "network inputs: Eq. 11 as it is, tanh(k x) of attitude and rate at nine scales, or "
         "module:function",
         choices=("state", "multiscale"),
         or_function=True,
     )
-    hidden_sizes: tuple[int, ...] = setting(
-        "neurons of each hidden layer (Table 3)", low=1, high=8192, most=8
+    hidden_sizes: tuple[int, ...] = _networks(
+        "neurons of each hidden layer, in the policy as in the value network (Table 3)",
+        low=1,
+        high=8192,
+        most=8,
     )
-    rate_margin: float = setting(
+    rate_margin: float = _networks(
         "mask actions after which coasting would pass this fraction of the rate limit; 0: no mask",
         low=0,
         high=1,
     )
 
-    # PPO
-    total_steps: int = setting(
-        "agent steps in the whole run, rounded up to whole updates", low=1, high=10**13
+    num_envs: int = _ppo(
+        "spacecraft simulated side by side (the paper's 30 episodes an epoch, Table 4)",
+        symbol="M",
+        low=1,
+        high=2**22,
     )
-    num_envs: int = setting("spacecraft simulated side by side", low=1, high=2**22)
-    greedy_share: float = setting(
+    greedy_share: float = _ppo(
         "share of the spacecraft that act greedily, as in flight, while the others explore",
         low=0,
         below=1,
     )
-    rollout_length: int = setting(
+    rollout_length: int = _ppo(
         "agent steps of each spacecraft between two updates", low=1, high=2**16
     )
-    passes: int = setting("passes over the data of an update (N)", low=1, high=1000)
-    minibatch_size: int = setting("samples in a gradient step", low=1)
-    discount: float = setting("discount (gamma)", above=0, high=1)
-    discount_period: float = setting(
-        "time over which the discount applies, s; 0: an agent step, however long", low=0
+    passes: int = _ppo("passes over the data of an update", symbol="N", low=1, high=1000)
+    minibatch_size: int = _ppo("samples in a gradient step (batch size in Table 4)", low=1)
+    discount: float = _ppo("discount of later rewards (Eq. 2)", symbol="γ", above=0, high=1)
+    discount_period: float = _ppo(
+        "time that the discount applies to; 0: an agent step, however long", unit="s", low=0
     )
-    gae_lambda: float = setting("GAE's lambda; 1 is Eq. 5", low=0, high=1)
-    clip: float = setting("clipping parameter (epsilon, Eq. 4)", above=0, below=1)
-    entropy_coefficient: float = setting("weight of the entropy bonus (c) at the start", low=0)
-    final_entropy_coefficient: float = setting("and at the end; linear in between", low=0)
-    learning_rate: float = setting("Adam's learning rate at the start", above=0)
-    final_learning_rate: float = setting("and at the end; linear in between", low=0)
-    normalize_advantage: bool = setting("standardise the advantages of each minibatch")
-    max_gradient_norm: float = setting("clip each network's gradient norm; 0: do not", low=0)
-    updates_per_block: int = setting(
-        "updates between two progress lines, each a row of metrics.csv", low=1, high=10**6
+    gae_lambda: float = _ppo(
+        "share of later steps in the advantage (GAE); 1 is Eq. 5", symbol="λ", low=0, high=1
+    )
+    clip: float = _ppo("clipping parameter (Eq. 4)", symbol="ε", above=0, below=1)
+    entropy_coefficient: float = _ppo("weight of the entropy bonus at the start", symbol="c", low=0)
+    final_entropy_coefficient: float = _ppo("and at the end; linear in between", symbol="c", low=0)
+    learning_rate: float = _ppo("Adam's learning rate at the start (Table 4)", above=0)
+    final_learning_rate: float = _ppo("and at the end; linear in between", low=0)
+    normalize_advantage: bool = _ppo("standardise the advantages (Eq. 5) of each minibatch")
+    max_gradient_norm: float = _ppo("clip each network's gradient norm; 0: do not", low=0)
+
+    updates_per_block: int = _logging(
+        "updates between two looks at the run, each a row of metrics.csv", low=1, high=10**6
     )
 
     def __post_init__(self):
@@ -174,7 +208,7 @@ def check(field: dataclasses.Field, value) -> None:
     fits = isinstance(elements, tuple) and 0 < len(elements) <= field.metadata.get("most", math.inf)
     if not (fits and all(_fits(kind, field.metadata, x) for x in elements)):
         name = {int: "an integer", float: "a number", bool: "true or false"}.get(kind, "")
-        allowed = ["integers" if is_tuple else name, _describe(field.metadata)]
+        allowed = ["integers" if is_tuple else name, limits(field)]
         raise ValueError(f"{field.name} is {value!r}; it must be {' '.join(filter(None, allowed))}")
 
 
@@ -191,10 +225,17 @@ def _fits(kind, limits, x):
     )
 
 
-def _describe(limits):
-    if "choices" in limits:
-        choices = "one of " + ", ".join(limits["choices"])
-        return choices + (", or module:function" if "or_function" in limits else "")
+def limits(field: dataclasses.Field) -> str:
+    """What its values may be, beside their type; empty where there is no limit.
+
+    Example:
+        >>> limits(Settings.__dataclass_fields__["discount"])
+        'above 0 and at most 1'
+    """
+    given = field.metadata
+    if "choices" in given:
+        choices = "one of " + ", ".join(given["choices"])
+        return choices + (", or module:function" if "or_function" in given else "")
     words = {"low": "at least", "above": "above", "high": "at most", "below": "below"}
-    described = " and ".join(f"{word} {limits[k]}" for k, word in words.items() if k in limits)
-    return described + (f", {limits['most']} of them at most" if "most" in limits else "")
+    described = " and ".join(f"{word} {given[k]}" for k, word in words.items() if k in given)
+    return described + (f", {given['most']} of them at most" if "most" in given else "")

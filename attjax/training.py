@@ -6,7 +6,7 @@ from pathlib import Path
 
 import jax
 
-from attjax import assembly, checkpoint, cli, learner, nan_search, ppo, progress
+from attjax import assembly, checkpoint, cli, learner, metrics, nan_search, ppo, progress
 from attjax.run_folder import Config
 from attjax.settings import Settings
 
@@ -34,7 +34,8 @@ class Run:
         if checkpoint.latest(folder) is not None:
             self.learner = checkpoint.restore_learner(folder, self.learner)
         self.update = int(self.learner.update)
-        self.metrics_file = progress.MetricsFile(folder, self.agent_steps)
+        self.metrics_file = metrics.MetricsFile(folder, self.agent_steps)
+        self.logs = [self.metrics_file]
         self.terminal_error = None
 
     @property
@@ -60,6 +61,17 @@ class Run:
         if self.update:
             print(f"resumed at {self.agent_steps:,} agent steps")
 
+    def write_events(self) -> None:
+        """Write TensorBoard's event file, too.
+
+        Raises:
+            ImportError: tensorboardX is not installed.
+            FolderError: it cannot be written.
+        """
+        from attjax import tensorboard
+
+        self.logs.append(tensorboard.EventFile(self.folder, self.config, self.metrics_file.kept))
+
     def announce_longer(self, before: Settings) -> None:
         """Print what a larger total than ``before``'s changes from here on."""
         steps = self.update * self.settings.passes * self.settings.minibatches
@@ -79,9 +91,10 @@ class Run:
         """
         train_block = self._compiled(debug_nans) if self.goes_on else None
         total = self.settings.num_updates * self.settings.steps_per_update
+        rows = self.metrics_file.kept
         with checkpoint.Saver(self.folder) as saver:
-            with progress.ProgressLine(total, self.agent_steps) as line:
-                diverged = self._loop(train_block, saver, line, save_every_s)
+            with progress.Progress(total, self.agent_steps, rows, self.stop) as view:
+                diverged = self._loop(train_block, saver, view, save_every_s)
             if diverged:
                 print(f"train.py: error: {diverged}", file=sys.stderr)
                 return DIVERGED
@@ -102,25 +115,26 @@ class Run:
         print(f"compiled in {time.monotonic() - start:.1f} s", flush=True)
         return train_block
 
-    def _loop(self, train_block, saver, line, save_every_s):
+    def _loop(self, train_block, saver, view, save_every_s):
         """Run blocks until the end or a signal; returns what diverged, if anything."""
         start, saved = time.monotonic() - self.metrics_file.wall_s, time.monotonic()
         while self.goes_on:
             count = min(self.settings.updates_per_block, self.settings.num_updates - self.update)
             try:
-                self.learner, metrics = train_block(self.env_params, self.learner, count)
+                self.learner, block = train_block(self.env_params, self.learner, count)
             except nan_search.NotFinite as found:
                 return self._divergence(self.update, count, str(found))
-            diverged = {name: int(update) for name, update in metrics["diverged"].items()}
+            diverged = {name: int(update) for name, update in block["diverged"].items()}
             if max(diverged.values()) >= 0:
                 first = min(update for update in diverged.values() if update >= 0)
                 names = ", ".join(name for name, update in diverged.items() if update == first)
                 return self._divergence(first, 1, names)
             self.update += count
-            row = progress.metrics_row(metrics, self.agent_steps, time.monotonic() - start)
+            row = metrics.block_row(block, self.agent_steps, time.monotonic() - start)
             self.terminal_error = row["terminal_error_deg"]
-            self.metrics_file.append(row)
-            line.show(row)
+            for log in self.logs:
+                log.append(row)
+            view.show(row)
             if time.monotonic() - saved > save_every_s:
                 saver.save(self.learner, self.terminal_error)
                 saved = time.monotonic()

@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PHYSICS = ["test_truth.py", "test_dynamics.py", "test_quaternion.py", "test_env.py"]
 LEARNING = ["test_ppo.py", "test_rollout.py", "test_losses.py", "test_vector.py"]
-RUNS = ["test_checkpoint.py", "test_run_folder.py", "test_progress.py", "test_cli.py"]
+RUNS = ["test_checkpoint.py", "test_run_folder.py", "test_metrics.py", "test_cli.py"]
 FAULTS = {
     "sign of the gyroscopic term": (
         "dynamics.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
@@ -96,7 +96,7 @@ FAULTS = {
         "    return restored.replace(optimizer=template.optimizer, key=", RUNS,
     ),
     "rows after the checkpoint kept": (
-        "progress.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
+        "metrics.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
     ),
     "no lock on the folder": (
         "run_folder.py", "fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,

@@ -24,7 +24,7 @@ def metrics(folder):
 def test_training_reports_and_keeps_metrics(trained):
     folder, output = trained
     assert "7,680 agent steps (60 updates of 128)" in output
-    assert "compiled in" in output and "M steps" in output and "ETA" in output
+    assert "compiled in" in output and "/7.68k steps" in output and "ETA" in output
     assert output.strip().splitlines()[-1].endswith(f"python eval.py --checkpoint {folder}")
     rows = metrics(folder)
     assert [int(row["agent_steps"]) for row in rows] == list(range(256, 7681, 256))

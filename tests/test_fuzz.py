@@ -36,7 +36,14 @@ PLAUSIBLE |= {
 TRAIN_FLAGS = [*SETTINGS, "--preset", "--seed", "--save-every", "--nonsense"]
 EVAL_FLAGS = ["--episodes", "--frameskip", "--duration", "--seed", "--controller"]
 EVAL_FLAGS += ["--json", "--plot", "--nonsense"]
-TRAIN_SWITCHES = [["--resume"], ["--overwrite"], ["--overwrite"], ["--debug-nans"], []]
+TRAIN_SWITCHES = [
+    ["--resume"],
+    ["--overwrite"],
+    ["--overwrite"],
+    ["--debug-nans"],
+    ["--tensorboard"],
+    [],
+]
 EVAL_SWITCHES = [["--compare"], ["--best"], ["-v"], [], []]
 
 

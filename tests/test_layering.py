@@ -20,8 +20,9 @@ LAYERS = [
     {"rollout", "descent"},
     {"ppo"},
     {"presets", "assembly", "run_folder", "nan_search"},
-    {"progress", "report", "cli", "flight_policy"},
-    {"checkpoint", "config_file"},
+    {"help_text", "panel"},
+    {"progress", "metrics", "report", "cli", "flight_policy"},
+    {"checkpoint", "config_file", "tensorboard"},
     {"training", "plots", "export_c", "export_onnx", "export_stablehlo"},
 ]
 LEARNING = {"networks", "losses", "learner", "rollout", "descent", "ppo"}

@@ -78,6 +78,8 @@ def test_overwriting_that_is_killed_leaves_the_old_run_or_the_new_one(tmp_path, 
             (folder / number).mkdir()
             (folder / number / "a").touch()
             (folder / number / "b").touch()
+        (folder / "tensorboard").mkdir()
+        (folder / "tensorboard" / "events.out.tfevents.1.attjax").touch()
         if not killed_at(step, lambda: run_folder.create(folder, new, True), monkeypatch):  # noqa: B023
             break
         assert run_folder.read_config(folder) in (CONFIG, new)

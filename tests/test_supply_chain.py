@@ -47,6 +47,6 @@ def test_training_and_evaluation_open_no_connection(tmp_path, monkeypatch):
         monkeypatch.setattr(socket.socket, name, refuse)
     monkeypatch.setattr(socket, "getaddrinfo", refuse)
     folder = ["--checkpoint", str(tmp_path / "run")]
-    assert train_script.main([*TINY, "--total-steps", "1", *folder]) == 0
+    assert train_script.main([*TINY, "--total-steps", "1", "--tensorboard", *folder]) == 0
     arguments = ["--episodes", "2", "--duration", "1", "--device", "cpu"]
     assert eval_script.main([*arguments, *folder]) == 0

@@ -1,0 +1,112 @@
+"""TensorBoard's event files, ``tensorboard/`` in a run folder; needs tensorboardX.
+
+At each start the file is written anew from the rows of metrics.csv that the run goes on from, then
+it grows row by row. So it always tells what metrics.csv tells, whatever happened to the run before.
+
+Only tensorboardX's protocol buffers and checksum are used: its writers work in a thread, where a
+full disk ends in a traceback, and put hyperparameters into a further run beside the curves.
+"""
+
+import dataclasses
+import struct
+import time
+from pathlib import Path
+
+from tensorboardX.proto.event_pb2 import Event, SessionLog
+from tensorboardX.proto.summary_pb2 import Summary
+from tensorboardX.record_writer import masked_crc32c
+from tensorboardX.summary import hparams
+
+from attjax import metrics, run_folder
+
+TAGS = {
+    "episode_return": "episode/return",
+    "episode_return_std": "episode/return_std",
+    "success_rate": "episode/success_rate",
+    "overspeed_rate": "episode/overspeed_rate",
+    "terminal_error_deg": "episode/terminal_error_deg",
+    "episodes": "episode/ended",
+    "episode_return_n": "episode/return_n",
+    "policy_loss": "loss/policy",
+    "value_loss": "loss/value",
+    "explained_variance": "loss/explained_variance",
+    "entropy": "policy/entropy",
+    "approximate_kl": "policy/approximate_kl",
+    "clip_fraction": "policy/clip_fraction",
+    "wall_s": "time/wall_s",
+}
+"""Of the columns of metrics.csv but the agent steps, which every curve is drawn against."""
+
+RATE = "time/steps_per_s"
+"""Agent steps a second between two rows."""
+
+COMPARED = ("episode_return", "success_rate", "overspeed_rate", "terminal_error_deg")
+"""Columns that stand beside the settings in the tab HPARAMS."""
+
+
+class EventFile:
+    """The event file of a run; each row is in it when ``append`` returns.
+
+    Args:
+        folder: of the run; open.
+        config: shown in the tab HPARAMS.
+        rows: of metrics.csv, to begin with.
+
+    Raises:
+        FolderError: it cannot be written.
+    """
+
+    def __init__(self, folder: Path, config: run_folder.Config, rows: list[dict]):
+        self._folder, self._last = folder, None
+        seconds = float(rows[-1]["wall_s"]) if rows else 0.0
+        self._start = time.time() - seconds  # as if the run had never paused
+        events = [*_head(self._start, config), *(self._event(row) for row in rows)]
+        self._path = folder / run_folder.EVENTS / run_folder.EVENT_FILE.format(time.time_ns())
+        with run_folder.writing(folder):
+            self._path.parent.mkdir(exist_ok=True)
+            run_folder.remove_events(folder)
+            run_folder.replace(self._path, b"".join(map(_record, events)))
+
+    def append(self, row: dict) -> None:
+        """Add one row of metrics.
+
+        Raises:
+            FolderError: it cannot be written.
+        """
+        record = _record(self._event(metrics.cells(row)))
+        with run_folder.writing(self._folder), self._path.open("ab") as file:
+            file.write(record)
+
+    def _event(self, cells):
+        """The curves' next points; cells that are empty make none."""
+        values = {TAGS[name]: float(x) for name, x in cells.items() if name in TAGS and _is_set(x)}
+        steps, seconds = int(cells["agent_steps"]), float(cells["wall_s"])
+        last_steps, last_seconds = self._last or (0, 0.0)
+        if seconds > last_seconds:
+            values[RATE] = (steps - last_steps) / (seconds - last_seconds)
+        self._last = steps, seconds
+        points = [Summary.Value(tag=tag, simple_value=x) for tag, x in values.items()]
+        return Event(step=steps, wall_time=self._start + seconds, summary=Summary(value=points))
+
+
+def _is_set(cell):
+    return cell not in (None, "")
+
+
+def _head(wall_time, config):
+    """What an event file begins with; a TensorBoard that shows an older one starts over."""
+    yield Event(wall_time=wall_time, file_version="brain.Event:2")
+    yield Event(wall_time=wall_time, session_log=SessionLog(status=SessionLog.START))
+    values = {"preset": config.preset, "seed": config.seed, **dataclasses.asdict(config.settings)}
+    shown = {k: ",".join(map(str, v)) if isinstance(v, tuple) else v for k, v in values.items()}
+    # The session's end is left out: it would say that the run has ended, and how.
+    for summary in hparams(shown, dict.fromkeys(TAGS[name] for name in COMPARED))[:2]:
+        yield Event(wall_time=wall_time, summary=summary)
+
+
+def _record(event):
+    """The event framed as in TFRecord files: length, its checksum, data, its checksum."""
+    data = event.SerializeToString()
+    length = struct.pack("<Q", len(data))
+    checksums = [struct.pack("<I", masked_crc32c(part)) for part in (length, data)]
+    return length + checksums[0] + data + checksums[1]

@@ -1,0 +1,224 @@
+"""The event files of --tensorboard tell what metrics.csv tells, whatever happened to the run."""
+
+import csv
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import time
+
+import jax
+import numpy as np
+import pytest
+from commands import ROOT, STEPS_PER_UPDATE, TINY, one_line_error, run, train_script
+from test_checkpoint import CONFIG
+
+from attjax import checkpoint, metrics, run_folder
+
+pytest.importorskip("tensorboardX")
+
+from tensorboardX.proto.event_pb2 import Event, SessionLog
+from tensorboardX.proto.plugin_hparams_pb2 import HParamsPluginData
+from tensorboardX.record_writer import masked_crc32c
+
+from attjax import tensorboard
+
+
+def records(folder):
+    """The events of the folder's only event file, each with its checksums checked."""
+    (path,) = (folder / "tensorboard").iterdir()
+    data = path.read_bytes()
+    while data:
+        size, check = struct.unpack("<QI", data[:12])
+        assert check == masked_crc32c(data[:8])
+        assert struct.unpack("<I", data[12 + size : 16 + size])[0] == masked_crc32c(
+            data[12:][:size]
+        )
+        yield Event.FromString(data[12:][:size])
+        data = data[16 + size :]
+
+
+def points(folder):
+    """{tag: [(step, value)]} of all curves."""
+    curves = {}
+    for event in records(folder):
+        for value in event.summary.value:
+            if not value.tag.startswith("_hparams_"):
+                curves.setdefault(value.tag, []).append((event.step, value.simple_value))
+    return curves
+
+
+def expected(folder):
+    """The same from metrics.csv."""
+    with (folder / "metrics.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    curves, last_steps, last_seconds = {}, 0, 0.0
+    for row in rows:
+        steps, seconds = int(row["agent_steps"]), float(row["wall_s"])
+        for name, tag in tensorboard.TAGS.items():
+            if row[name]:
+                curves.setdefault(tag, []).append((steps, float(np.float32(row[name]))))
+        if seconds > last_seconds:
+            rate = np.float32((steps - last_steps) / (seconds - last_seconds))
+            curves.setdefault("time/steps_per_s", []).append((steps, float(rate)))
+        last_steps, last_seconds = steps, seconds
+    return curves
+
+
+def row(steps, **values):
+    cells = dict.fromkeys(metrics.COLUMNS)
+    return cells | {"agent_steps": steps, "wall_s": steps / 100} | values
+
+
+def test_every_column_is_a_curve():
+    assert {"agent_steps", *tensorboard.TAGS} == set(metrics.COLUMNS)
+    assert len({*tensorboard.TAGS.values(), tensorboard.RATE}) == len(tensorboard.TAGS) + 1
+    assert all(tag.count("/") == 1 for tag in tensorboard.TAGS.values())
+
+
+def test_points_are_those_of_the_rows(tmp_path):
+    file = metrics.MetricsFile(tmp_path, 0)
+    events = tensorboard.EventFile(tmp_path, CONFIG, file.kept)
+    rows = [row(100, entropy=1 / 3), row(200, episode_return=1e-9, value_loss=float("inf"))]
+    for each in [*rows, row(300, entropy=float("nan"))]:
+        file.append(each)
+        events.append(each)
+    found = points(tmp_path)
+    (step, entropy), (_, nan) = found.pop("policy/entropy")
+    assert (step, entropy) == (100, np.float32("0.3333333")) and np.isnan(nan)
+    assert found["time/steps_per_s"] == [(100, 100), (200, 100), (300, 100)]
+    assert found["loss/value"] == [(200, np.inf)]
+    assert found["episode/return"] == [(200, np.float32(1e-9))]
+    assert "episode/success_rate" not in found  # no episode ended
+
+
+def test_hyperparameters_are_all_of_the_run(tmp_path):
+    tensorboard.EventFile(tmp_path, CONFIG, [])
+    version, start, experiment, session = records(tmp_path)
+    assert version.file_version == "brain.Event:2"
+    assert (start.session_log.status, start.step) == (SessionLog.START, 0)
+    (value,) = session.summary.value
+    data = HParamsPluginData.FromString(value.metadata.plugin_data.content)
+    shown = data.session_start_info.hparams
+    assert set(shown) == {"preset", "seed", *vars(CONFIG.settings)}
+    assert shown["preset"].string_value == CONFIG.preset
+    assert shown["clip"].number_value == CONFIG.settings.clip
+    assert shown["frameskips"].string_value == ",".join(map(str, CONFIG.settings.frameskips))
+    assert shown["stagger_episodes"].bool_value is CONFIG.settings.stagger_episodes
+    (value,) = experiment.summary.value
+    data = HParamsPluginData.FromString(value.metadata.plugin_data.content)
+    assert {m.name.tag for m in data.experiment.metric_infos} <= set(tensorboard.TAGS.values())
+
+
+def test_a_start_writes_the_kept_rows_anew(tmp_path):
+    """Whatever stood there: rows after the checkpoint, half a record, half a file."""
+    for steps_kept in (300, 200, 0):
+        file = metrics.MetricsFile(tmp_path, steps_kept)
+        events = tensorboard.EventFile(tmp_path, CONFIG, file.kept)
+        assert points(tmp_path) == expected(tmp_path)
+        done = int(file.kept[-1]["agent_steps"]) if file.kept else 0
+        for steps in range(done + 100, 600, 100):
+            for log in (file, events):
+                log.append(row(steps, entropy=steps / 7))
+        assert points(tmp_path) == expected(tmp_path)
+        (path,) = (tmp_path / "tensorboard").iterdir()
+        path.write_bytes(path.read_bytes()[:-5])
+        path.with_name(path.name + ".tmp").write_bytes(b"half")
+
+
+def test_the_clock_leaves_the_pauses_out(tmp_path):
+    file = metrics.MetricsFile(tmp_path, 0)
+    for steps in (100, 200):
+        file.append(row(steps, entropy=1.0))
+    kept = metrics.MetricsFile(tmp_path, 200).kept
+    tensorboard.EventFile(tmp_path, CONFIG, kept).append(row(300, entropy=1.0))
+    times = [e.wall_time for e in records(tmp_path) if e.step]
+    np.testing.assert_allclose(np.diff(times), 1.0, atol=1e-6)
+
+
+def test_a_run_with_event_files_is_the_same_run(trained, tmp_path):
+    """SIGKILL amid it and --resume; the same policy to the bit, and curves as in metrics.csv."""
+    folder = tmp_path / "ckpt"
+    total = 60 * STEPS_PER_UPDATE
+    flags = [*TINY, "--total-steps", total, "--checkpoint", folder, "--tensorboard", "--save-every"]
+    command = [sys.executable, str(ROOT / "train.py"), *map(str, flags), "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        while process.poll() is None and (checkpoint.latest(folder) or 0) < 10:
+            time.sleep(0.02)
+        process.kill()
+    assert 10 <= checkpoint.latest(folder) < 60
+    resumed = run("train.py", *flags, 0, "--resume")
+    assert resumed.returncode == 0, resumed.stderr
+    assert points(folder) == expected(folder)
+    assert [step for step, _ in points(folder)["policy/entropy"]] == [*range(256, total + 1, 256)]
+    a, b = (checkpoint.restore_policy(path).args[0] for path in (trained[0], folder))
+    jax.tree.map(np.testing.assert_array_equal, a, b)
+
+
+def test_a_run_that_has_ended_gets_its_event_file(trained, tmp_path, capsys):
+    folder = tmp_path / "ckpt"
+    shutil.copytree(trained[0], folder)
+    arguments = ["--resume", "--device", "cpu", "--checkpoint", str(folder), "--tensorboard"]
+    assert train_script.main(arguments) == 0
+    assert points(folder) == expected(folder) and "policy/entropy" in points(folder)
+
+
+@pytest.mark.parametrize("kept", [False, True])
+def test_overwriting_removes_the_event_files_and_no_others(tmp_path, kept):
+    run_folder.create(tmp_path, CONFIG, overwrite=False)
+    tensorboard.EventFile(tmp_path, CONFIG, [])
+    if kept:
+        (tmp_path / "tensorboard" / "events.out.tfevents.1.another").touch()
+    run_folder.create(tmp_path, CONFIG, overwrite=True)
+    found = sorted(str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*"))
+    others = ["tensorboard", "tensorboard/events.out.tfevents.1.another"] if kept else []
+    assert found == ["config.json", *others]
+
+
+def test_leftover_event_files_give_way_and_those_of_others_are_refused(tmp_path):
+    tensorboard.EventFile(tmp_path, CONFIG, [])
+    run_folder.create(tmp_path, CONFIG, overwrite=False)
+    assert [p.name for p in tmp_path.iterdir()] == ["config.json"]
+    (tmp_path / "config.json").unlink()
+    tensorboard.EventFile(tmp_path, CONFIG, [])
+    (tmp_path / "tensorboard" / "events.out.tfevents.1.another").touch()
+    with pytest.raises(run_folder.FolderError, match="not empty"):
+        run_folder.create(tmp_path, CONFIG, overwrite=False)
+    assert len(list((tmp_path / "tensorboard").iterdir())) == 2
+
+
+def test_without_tensorboardx_nothing_is_written(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "tensorboardX", None)
+    folder = tmp_path / "ckpt"
+    arguments = [*TINY, "--tensorboard", "--checkpoint", str(folder)]
+    error = one_line_error(train_script.main, arguments, capsys)
+    assert error.endswith("needs tensorboardX: pip install 'attjax[tensorboard]'\n")
+    assert not folder.exists()
+
+
+def test_a_full_disk_is_one_line(tmp_path, monkeypatch):
+    events = tensorboard.EventFile(tmp_path, CONFIG, [])
+    (path,) = (tmp_path / "tensorboard").iterdir()
+    path.unlink()
+    path.symlink_to("/dev/full")
+    with pytest.raises(run_folder.FolderError, match="cannot be written: No space left"):
+        events.append(row(100, entropy=1.0))
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written_is_one_line(trained, tmp_path, capsys):
+    folder = tmp_path / "ckpt"
+    shutil.copytree(trained[0], folder)
+    (folder / "tensorboard").mkdir(mode=0o500)
+    arguments = ["--resume", "--device", "cpu", "--checkpoint", str(folder), "--tensorboard"]
+    assert "cannot be written" in one_line_error(train_script.main, arguments, capsys)
+
+
+def test_a_file_in_the_place_of_the_folder_is_one_line(trained, tmp_path, capsys):
+    folder = tmp_path / "ckpt"
+    shutil.copytree(trained[0], folder)
+    (folder / "tensorboard").write_text("precious")
+    arguments = ["--resume", "--device", "cpu", "--checkpoint", str(folder), "--tensorboard"]
+    assert "cannot be written" in one_line_error(train_script.main, arguments, capsys)
+    assert (folder / "tensorboard").read_text() == "precious"
