@@ -97,7 +97,8 @@ def _head(wall_time, config):
     """What an event file begins with; a TensorBoard that shows an older one starts over."""
     yield Event(wall_time=wall_time, file_version="brain.Event:2")
     yield Event(wall_time=wall_time, session_log=SessionLog(status=SessionLog.START))
-    values = {"preset": config.preset, "seed": config.seed, **dataclasses.asdict(config.settings)}
+    values = {"preset": config.preset, "seed": config.seed, "spacecraft": config.spacecraft.name}
+    values |= dataclasses.asdict(config.settings)
     shown = {k: ",".join(map(str, v)) if isinstance(v, tuple) else v for k, v in values.items()}
     # The session's end is left out: it would say that the run has ended, and how.
     for summary in hparams(shown, dict.fromkeys(TAGS[name] for name in COMPARED))[:2]:
