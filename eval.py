@@ -5,9 +5,11 @@ Example:
     python eval.py --checkpoint ckpt/ --frameskip 20 --json result.json
     python eval.py --controller phase-plane
     python eval.py --checkpoint ckpt/ --compare
+    python eval.py --checkpoint ckpt/ --playback slews.html
 """
 
 import json
+import os
 import sys
 import time
 from pathlib import Path
@@ -36,6 +38,11 @@ def parse_arguments(argv):
     cli.add_number(parser, "duration", float, 43.75, "length of an episode, s", above=0, high=1e6)
     plot_help = "also draw figures into this folder (needs the extra plot)"
     parser.add_argument("--plot", type=Path, metavar="FOLDER", help=plot_help)
+    playback_help = (
+        "also write a web page that replays slews in 3-D: the controller beside phase-plane, or "
+        "phase-plane beside feedback"
+    )
+    parser.add_argument("--playback", type=Path, metavar="FILE", help=playback_help)
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the statistics here")
     return parser.parse_args(argv)
 
@@ -49,7 +56,8 @@ def main(argv=None) -> int:
         steps = _episode_steps(arguments.duration, arguments.frameskip)
         names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
         controllers = {name: _controller(name, arguments) for name in names}
-        _check_writable(arguments.json)
+        _check_writable("--json", arguments.json)
+        _prepare_playback(arguments.playback, steps)
         plots = _prepare_plots(arguments.plot)
         metrics = _metrics(arguments.checkpoint) if plots and POLICY in controllers else []
         return _evaluate(arguments, controllers, steps, plots, metrics)
@@ -81,6 +89,8 @@ def _evaluate(arguments, controllers, steps, plots, metrics):
         report.print_comparison(results)
     else:
         report.print_report(results[0])
+    if arguments.playback:
+        _write_playback(arguments, controllers, env, params)
     print(f"evaluated in {time.monotonic() - start:.1f} s, compilation included")
     if arguments.json:
         content = {"controllers": results} if arguments.compare else results[0]
@@ -111,6 +121,37 @@ def _prepare_plots(folder):
     return plots
 
 
+def _prepare_playback(path, steps):
+    """Fail before the work rather than after it."""
+    if path is None:
+        return
+    from attjax import playback
+
+    if steps > playback.MAX_STEPS:
+        raise cli.UserError(
+            f"--playback shows slews of at most {playback.MAX_STEPS:,} agent steps, and these "
+            f"have {steps:,}: give a shorter --duration or a larger --frameskip"
+        )
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise cli.UserError(f"--playback {path} cannot be written: it is no ordinary file")
+    _check_writable("--playback", path)
+    _check_writable("--playback", path.with_name(path.name + ".tmp"))  # as run_folder.replace does
+
+
+def _write_playback(arguments, controllers, env, params):
+    """The controller that is judged beside phase-plane, or that beside feedback."""
+    from attjax import playback
+
+    name = next(iter(controllers))
+    other = "feedback" if name == "phase-plane" else "phase-plane"
+    shown = {name: controllers[name], other: _controller(other, arguments)}
+    checkpoint = arguments.checkpoint.resolve().name if name == POLICY else None
+    page = playback.page(shown, env, params, arguments.seed or 0, checkpoint)
+    with run_folder.writing(arguments.playback):
+        run_folder.replace(arguments.playback, page)
+    print(f"wrote {arguments.playback}")
+
+
 def _controller(name, arguments):
     import jax
 
@@ -133,15 +174,15 @@ def _episode_steps(duration, frameskip):
     return steps
 
 
-def _check_writable(path):
+def _check_writable(flag, path):
     """Fail before the work rather than after it; leaves no new file behind."""
     if path is None:
         return
-    existed = path.exists()
     try:
+        existed = path.exists()
         path.open("a").close()
     except OSError as error:
-        raise cli.UserError(f"--json {path} cannot be written: {error.strerror}") from None
+        raise cli.UserError(f"{flag} {path} cannot be written: {error.strerror}") from None
     if not existed:
         path.unlink()
 

@@ -22,7 +22,7 @@ LAYERS = [
     {"presets", "assembly", "run_folder", "nan_search"},
     {"progress", "report", "cli", "flight_policy"},
     {"checkpoint", "config_file"},
-    {"training", "plots", "export_c", "export_onnx", "export_stablehlo"},
+    {"training", "plots", "playback", "export_c", "export_onnx", "export_stablehlo"},
 ]
 LEARNING = {"networks", "losses", "learner", "rollout", "descent", "ppo"}
 SPACECRAFT = {"spacecraft", "reward", "env"}
