@@ -53,7 +53,7 @@ function paintFaces(scene, faces) {
 }
 
 function paintFace({ context, colours, light, place }, face) {
-  const brightness = 0.58 + 0.42 * Math.max(dot(face.normal, light), 0);
+  const brightness = 0.7 + 0.3 * Math.max(dot(face.normal, light), 0);
   const fill = shaded(colours[face.colour], brightness);
   trace(context, face.points.map(place), true);
   context.fillStyle = fill;

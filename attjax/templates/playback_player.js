@@ -97,10 +97,10 @@ function update() {
     placeCursor(panel);
     if (player.span < duration) paintChart(panel);
   }
-  const clock = `${(step * data.controlPeriod).toFixed(2)} s`;
+  const clock = (step * data.controlPeriod).toFixed(2);
   element("time").value = step;
-  element("time").setAttribute("aria-valuetext", clock);
-  element("clock").textContent = `${clock} of ${duration.toFixed(2)} s`;
+  element("time").setAttribute("aria-valuetext", `${clock} s`);
+  element("clock").textContent = `${clock} / ${duration.toFixed(2)} s`;
 }
 
 function placeCursor({ curves, futures }) {

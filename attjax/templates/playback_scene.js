@@ -8,8 +8,9 @@
 // a positive w1 the body's y axis turns towards its z axis, as the right-hand rule says.
 
 const REACH = 1.2; // from the centre to the tip of a solar panel; all lengths are in its units
-const BODY_AXIS = 1.4;
-const GOAL_AXIS = 1.65;
+const BODY_AXIS = 1.38;
+const GOAL_AXIS = 1.72;
+const LABEL = 17; // CSS pixels between the tip of a goal axis and the edge, unless zoomed
 const AXES = ["x", "y", "z"];
 
 function rotation([x, y, z, w]) {
@@ -34,7 +35,7 @@ function viewFrom(camera, width, height) {
   const towards = [ce * ca, ce * sa, se];
   const right = [-sa, ca, 0];
   const up = [-se * ca, -se * sa, ce];
-  const scale = (0.44 * Math.min(height, width) * camera.zoom) / GOAL_AXIS;
+  const scale = (camera.zoom * (Math.min(height, width) / 2 - LABEL)) / (1.03 * GOAL_AXIS);
   const distance = 7;
   return {
     eye: towards.map((x) => distance * x),
