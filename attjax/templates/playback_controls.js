@@ -116,6 +116,7 @@ element("conditions").textContent = conditions();
 document.title = `attjax playback: ${data.controllers.join(" and ")}`;
 element("slew").append(...data.slews.map((name) => new Option(name)));
 element("time").max = data.steps;
+element("clock").style.minWidth = `${2 * duration.toFixed(2).length + 4}ch`;
 listen();
 updateAll();
 window.attjax = { data, flights, player, camera, rotation };

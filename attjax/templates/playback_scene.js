@@ -35,14 +35,15 @@ function viewFrom(camera, width, height) {
   const towards = [ce * ca, ce * sa, se];
   const right = [-sa, ca, 0];
   const up = [-se * ca, -se * sa, ce];
-  const scale = (camera.zoom * (Math.min(height, width) / 2 - LABEL)) / (1.03 * GOAL_AXIS);
+  const middle = 0.56 * height; // below the centre, as the goal's z axis points up and none down
+  const scale = (camera.zoom * (Math.min(middle, width / 2) - LABEL)) / (1.03 * GOAL_AXIS);
   const distance = 7;
   return {
     eye: towards.map((x) => distance * x),
     light: towards.map((x, i) => 0.62 * x - 0.4 * right[i] + 0.68 * up[i]),
     project(p) {
       const nearer = (scale * distance) / (distance - dot(p, towards));
-      return [width / 2 + nearer * dot(p, right), height / 2 - nearer * dot(p, up)];
+      return [width / 2 + nearer * dot(p, right), middle - nearer * dot(p, up)];
     },
   };
 }
