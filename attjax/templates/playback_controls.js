@@ -102,7 +102,7 @@ function listenToCurves({ curves }) {
 
 function conditions() {
   const hertz = (1 / data.controlPeriod).toFixed(2);
-  const tensor = data.inertia.map((row) => (Array.isArray(row) ? `(${row.map(short)})` : short(row)));
+  const tensor = data.inertia.map((row) => (Array.isArray(row) ? `(${row.map(short).join(", ")})` : short(row)));
   const shape = Array.isArray(data.inertia[0]) ? "" : "diag";
   return [
     `${hertz} Hz (frameskip ${data.frameskip})`, `seed ${data.seed}`,
@@ -116,7 +116,7 @@ element("conditions").textContent = conditions();
 document.title = `attjax playback: ${data.controllers.join(" and ")}`;
 element("slew").append(...data.slews.map((name) => new Option(name)));
 element("time").max = data.steps;
-element("clock").style.minWidth = `${2 * duration.toFixed(2).length + 4}ch`;
+element("clock").style.minWidth = `${2 * duration.toFixed(2).length + 3}ch`;
 listen();
 updateAll();
 window.attjax = { data, flights, player, camera, rotation };

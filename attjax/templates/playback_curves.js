@@ -69,16 +69,16 @@ function paintAngle({ context, layout: { angle: plot }, x, first, last, ...chart
   const y = (degrees) =>
     plot.bottom - ((Math.log10(Math.max(degrees, 10 ** low)) - low) / (high - low)) *
     (plot.bottom - plot.top);
-  title(context, plot, "error angle φ (°)", colours);
+  const goal = data.goalAngle * DEGREES;
+  title(context, plot, `error angle φ (°), goal ${short(goal)}`, colours);
   const every = Math.ceil((high - low) / ((plot.bottom - plot.top) / 14));
   for (let k = low; k <= high; k += every) {
     rule(context, [plot.left, y(10 ** k)], [plot.right, y(10 ** k)], colours.line, 0.5);
     const label = k >= -2 ? String(10 ** k) : `1e−${-k}`;
     write(context, label, plot.left - 6, y(10 ** k), "right", colours.muted);
   }
-  const goal = data.goalAngle * DEGREES;
   rule(context, [plot.left, y(goal)], [plot.right, y(goal)], colours.ink, 1, [4, 3]);
-  write(context, `${short(goal)}°`, plot.right + 6, y(goal), "left", colours.ink);
+  write(context, "goal", plot.right + 6, y(goal), "left", colours.ink);
   const points = range(first, last, (k) =>
     [x(k * data.controlPeriod), y(flight.angle[k] * DEGREES)]);
   curve(context, plot, points, colours.ink, 1.4);
