@@ -1,7 +1,5 @@
 """The page of eval.py --playback: what it holds. What it does: test_playback_browser.py."""
 
-import base64
-import json
 import os
 import re
 from html.parser import HTMLParser
@@ -11,23 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from commands import eval_script, one_line_error
+from pages import CONTROLLERS, ENV, HOSTILE, embedded
 
 import attjax
-from attjax import AttitudeEnv, controllers, evaluation, playback
-
-HOSTILE = "</script><script>alert(1)</script><!--\"'&$style\udcff"
-CONTROLLERS = {
-    "phase-plane": jax.tree_util.Partial(controllers.phase_plane),
-    "feedback": jax.tree_util.Partial(controllers.quaternion_feedback),
-}
-
-
-def embedded(page):
-    """The data of a page, with its flights as (slews, controllers, steps + 1, 10)."""
-    data = json.loads(re.search(r'id="flights">(.*?)</script>', page)[1])
-    flights = [[np.frombuffer(base64.b64decode(x), "<f4") for x in s] for s in data["flights"]]
-    data["flights"] = np.array(flights).reshape(len(flights), -1, data["steps"] + 1, 10)
-    return data
+from attjax import AttitudeEnv, evaluation, playback
 
 
 def test_the_page_holds_the_recorded_flights():
@@ -84,9 +69,8 @@ class Elements(HTMLParser):
 
 @pytest.fixture(scope="module")
 def page():
-    env = AttitudeEnv(frameskip=20)
-    params = env.default_params.replace(max_steps_in_episode=jnp.array(4, jnp.int32))
-    return playback.page(CONTROLLERS, env, params, 0, HOSTILE)
+    params = ENV.default_params.replace(max_steps_in_episode=jnp.array(4, jnp.int32))
+    return playback.page(CONTROLLERS, ENV, params, 0, HOSTILE + "\udcff")
 
 
 def test_the_page_needs_nothing_else(page):
@@ -97,7 +81,7 @@ def test_the_page_needs_nothing_else(page):
 
 
 def test_a_hostile_name_stays_text(page):
-    assert embedded(page)["checkpoint"] == HOSTILE
+    assert embedded(page)["checkpoint"] == HOSTILE + "\udcff"
     assert [tag for tag, _ in Elements(page).found].count("script") == 2
     page.encode()  # a name that is no UTF-8 must not end the writing
 

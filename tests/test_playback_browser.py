@@ -1,69 +1,20 @@
-"""The page of eval.py --playback in a browser; skipped where there is no Chromium."""
-
-import shutil
+"""Controls and numbers of the page of eval.py --playback; skipped where there is no Chromium."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
-from test_playback import CONTROLLERS, HOSTILE, embedded
+from pages import CONTROLLERS, ENV, HOSTILE, embedded, find
 
-from attjax import AttitudeEnv, EnvState, evaluation, playback, step
-from attjax import quaternion as quaternions
+from attjax import evaluation
 
 webdriver = pytest.importorskip("selenium.webdriver")
-from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
 from selenium.webdriver.support.ui import Select, WebDriverWait  # noqa: E402
-
-ENV = AttitudeEnv(frameskip=20)
-PARAMS = ENV.default_params
-FLAGS = (
-    "headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run",
-    "disable-background-networking", "disable-component-update", "disable-sync",
-    "window-size=1280,900",
-)  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def driver(tmp_path_factory):
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    chromedriver = shutil.which("chromedriver")
-    if not (chromium and chromedriver):
-        pytest.skip("no Chromium with its chromedriver")
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium
-    for flag in (*FLAGS, f"user-data-dir={tmp_path_factory.mktemp('chromium')}"):
-        options.add_argument(f"--{flag}")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    service = webdriver.ChromeService(chromedriver)
-    with webdriver.Chrome(options, service) as driver:
-        yield driver
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory):
-    path = tmp_path_factory.mktemp("page") / "slews.html"
-    path.write_text(playback.page(CONTROLLERS, ENV, PARAMS, 0, HOSTILE[:-1]), encoding="utf-8")
-    return path
-
-
-@pytest.fixture
-def browser(driver, page):
-    """The page freshly loaded; no test may leave an error on the console."""
-    driver.get(page.as_uri())
-    yield driver
-    assert driver.get_log("browser") == []
-
-
-def find(browser, selector):
-    return browser.find_element(By.CSS_SELECTOR, selector)
 
 
 def numbers(browser, name):
     """One of the live numbers, in both panels."""
-    return [x.text for x in browser.find_elements(By.CSS_SELECTOR, f"dd.{name}")]
+    return [x.text for x in browser.find_elements("css selector", f"dd.{name}")]
 
 
 def time(browser):
@@ -79,9 +30,9 @@ def pictures(browser):
     return browser.execute_script(script)
 
 
-def angles_deg(page):
+def angles_deg(slews_html):
     """(slews, controllers, steps + 1), in float64."""
-    q = embedded(page.read_text(encoding="utf-8"))["flights"][..., :4].astype(float)
+    q = embedded(slews_html.read_text(encoding="utf-8"))["flights"][..., :4].astype(float)
     return np.rad2deg(2 * np.arctan2(np.linalg.norm(q[..., :3], axis=-1), q[..., 3]))
 
 
@@ -125,9 +76,9 @@ def test_speed_and_the_end(browser):
     assert 0 <= time(browser) < 40
 
 
-def test_the_numbers_are_those_of_the_flight(browser, page):
-    angles = angles_deg(page)
-    data = embedded(page.read_text(encoding="utf-8"))
+def test_the_numbers_are_those_of_the_flight(browser, slews_html):
+    angles = angles_deg(slews_html)
+    data = embedded(slews_html.read_text(encoding="utf-8"))
     slews = Select(find(browser, "#slew"))
     assert [option.text for option in slews.options] == data["slews"]
     for slew, (name, of_slew) in enumerate(zip(data["slews"], angles)):
@@ -151,7 +102,9 @@ def test_the_numbers_are_those_of_the_flight(browser, page):
 
 
 def test_settling_times_are_those_of_the_evaluation(browser):
-    flown = evaluation.fly(CONTROLLERS["phase-plane"], ENV, PARAMS, jax.random.key(0), 4)
+    flown = evaluation.fly(
+        CONTROLLERS["phase-plane"], ENV, ENV.default_params, jax.random.key(0), 4
+    )
     times = evaluation.settling_times(flown, ENV)
     for index, expected in enumerate(times):
         Select(find(browser, "#slew")).select_by_index(3 + index)
@@ -161,7 +114,7 @@ def test_settling_times_are_those_of_the_evaluation(browser):
 
 def test_a_click_or_a_drag_on_the_curves_scrubs(browser):
     actions = webdriver.ActionChains(browser)
-    for curves in browser.find_elements(By.CSS_SELECTOR, ".curves"):
+    for curves in browser.find_elements("css selector", ".curves"):
         width = curves.size["width"] - 52 - 42  # the margins of playback_curves.js
         for share in (0.5, 0.2):
             across = round(52 + share * width - curves.size["width"] / 2)
@@ -184,85 +137,9 @@ def test_a_narrow_window_of_time_is_drawn_larger(browser):
     assert len({whole, narrow, browser.execute_script(chart)}) == 3
 
 
-def test_drag_wheel_and_keys_move_the_camera(browser):
-    def camera():
-        return browser.execute_script("return {...attjax.camera}")
-
-    scene, start = find(browser, ".scene"), camera()
-    actions = webdriver.ActionChains(browser)
-    actions.drag_and_drop_by_offset(scene, 60, 30).perform()
-    turned = camera()
-    assert turned["azimuth"] < start["azimuth"] and turned["elevation"] > start["elevation"]
-    browser.execute_script(
-        "document.querySelector('.scene').dispatchEvent(new WheelEvent('wheel', {deltaY: -200}))"
-    )
-    assert camera()["zoom"] > turned["zoom"]
-    scene.send_keys(Keys.ARROW_LEFT, "-")
-    assert camera()["azimuth"] < turned["azimuth"]
-
-
-def rotations(browser, q):
-    """Rotation matrices as the page computes them."""
-    script = "return arguments[0].map(attjax.rotation)"
-    return np.array(browser.execute_script(script, np.asarray(q, float).tolist()))
-
-
-def test_the_drawn_attitude_is_that_of_eq_9(browser):
-    """Columns are the body's axes in the goal's frame, and turn by R [ω]× under body rates ω."""
-    random = np.random.default_rng(0)
-    q, rate = Rotation.random(50, random).as_quat(), random.normal(size=(50, 3))
-    np.testing.assert_allclose(rotations(browser, q), Rotation.from_quat(q).as_matrix(), atol=1e-12)
-    dt = 1e-6
-    change = np.array([quaternions.derivative(a, w) for a, w in zip(q, rate)])
-    after, before = (rotations(browser, q + sign * dt * change) for sign in (1, -1))
-    turning = np.cross(rate[:, None], np.eye(3)).swapaxes(1, 2)  # columns: ω × each axis
-    np.testing.assert_allclose(
-        (after - before) / (2 * dt), rotations(browser, q) @ turning, atol=1e-6
-    )
-
-
-def test_a_positive_torque_about_x_turns_y_towards_z(browser):
-    state = EnvState(jnp.array([0.0, 0, 0, 1]), jnp.zeros(3), 0)
-    fly = jax.jit(step)
-    for _ in range(30):
-        state = fly(state, 1)  # +0.5 N m about x
-    (matrix,) = rotations(browser, [state.quaternion])
-    x, y, z = matrix.T
-    np.testing.assert_allclose(x, [1, 0, 0], atol=1e-6)
-    assert y[2] > 0.01 and z[1] < -0.01
-
-
-def test_the_axes_are_painted_where_the_attitude_puts_them(browser):
-    """Seen along −x, the goal's y points right and z up; +50° about x lifts the body's y."""
-    half = np.deg2rad(50) / 2
-    script = """
-    Object.assign(attjax.camera, {azimuth: 0, elevation: 0});
-    attjax.flights[0][0].quaternion = () => arguments[0];
-    document.getElementById("time").dispatchEvent(new Event("input"));
-    const canvas = document.querySelector(".scene"), {width, height} = canvas;
-    const pixels = canvas.getContext("2d").getImageData(0, 0, width, height).data;
-    const style = getComputedStyle(document.documentElement);
-    return ["--y", "--z"].map((name) => {
-      const hex = style.getPropertyValue(name).trim();
-      const colour = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
-      const found = [];
-      for (let i = 0; i < pixels.length; i += 4) {
-        if (colour.every((value, k) => pixels[i + k] === value) && pixels[i + 3] === 255)
-          found.push([(i / 4) % width - width / 2, 0.56 * height - Math.floor(i / 4 / width)]);
-      }
-      return found;
-    });
-    """
-    found = browser.execute_script(script, [np.sin(half), 0, 0, np.cos(half)])
-    for pixels, degrees in zip(found, (50, 140)):
-        assert len(pixels) > 20
-        across, up = np.mean(pixels, axis=0)
-        assert np.rad2deg(np.arctan2(up, across)) == pytest.approx(degrees, abs=8)
-
-
 def test_conditions_are_shown_and_a_hostile_name_is_only_text(browser):
     conditions = find(browser, "#conditions").get_attribute("textContent")
-    for part in ("11.43 Hz (frameskip 20)", "seed 0", "diag(0.872, 0.115, 0.797)", HOSTILE[:-1]):
+    for part in ("11.43 Hz (frameskip 20)", "seed 0", "diag(0.872, 0.115, 0.797)", HOSTILE):
         assert part in conditions
     assert browser.execute_script("return document.scripts.length") == 2
 
