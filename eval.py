@@ -89,13 +89,13 @@ def _evaluate(arguments, controllers, steps, plots, metrics):
         report.print_comparison(results)
     else:
         report.print_report(results[0])
-    if arguments.playback:
-        _write_playback(arguments, controllers, env, params)
     print(f"evaluated in {time.monotonic() - start:.1f} s, compilation included")
     if arguments.json:
         content = {"controllers": results} if arguments.compare else results[0]
         with run_folder.writing(arguments.json):
             arguments.json.write_text(json.dumps(content, indent=2) + "\n")
+    if arguments.playback:
+        _write_playback(arguments, controllers, env, params)
     return 0
 
 
