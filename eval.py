@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import sys
 import time
 from pathlib import Path
@@ -18,6 +19,7 @@ examples:
   python eval.py --checkpoint ckpt/ --frameskip 20  the same at 11.43 Hz
   python eval.py --checkpoint ckpt/ --compare       beside the classical ones
   python eval.py --checkpoint ckpt/ --json result.json --plot figures/
+  python eval.py --checkpoint ckpt/ --playback slews.html
   python eval.py --controller phase-plane           needs no checkpoint
 """
 
@@ -62,6 +64,11 @@ def _add_output(group):
     group.add_argument("--json", type=Path, metavar="FILE", help="also write the statistics here")
     plot_help = "also draw figures into this folder (needs the extra plot)"
     group.add_argument("--plot", type=Path, metavar="FOLDER", help=plot_help)
+    playback_help = (
+        "also write a web page that replays slews in 3-D: the controller beside phase-plane, or "
+        "phase-plane beside feedback"
+    )
+    group.add_argument("--playback", type=Path, metavar="FILE", help=playback_help)
 
 
 def main(argv=None) -> int:
@@ -74,7 +81,8 @@ def main(argv=None) -> int:
         names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
         spacecraft = _spacecraft(arguments, names)
         controllers = {name: _controller(name, arguments, spacecraft) for name in names}
-        _check_writable(arguments.json)
+        _check_writable("--json", arguments.json)
+        _prepare_playback(arguments.playback, spacecraft.max_steps(arguments.frameskip))
         plots = _prepare_plots(arguments.plot)
         metrics = _metrics(arguments.checkpoint) if plots and POLICY in controllers else []
         return _evaluate(arguments, controllers, spacecraft, plots, metrics)
@@ -110,6 +118,8 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics):
         content = {"controllers": results} if arguments.compare else results[0]
         with run_folder.writing(arguments.json):
             arguments.json.write_text(json.dumps(content, indent=2) + "\n")
+    if arguments.playback:
+        _write_playback(arguments, controllers, env, params)
     return 0
 
 
@@ -133,6 +143,37 @@ def _prepare_plots(folder):
     except OSError as error:
         raise cli.UserError(f"--plot {folder} cannot be written: {error.strerror}") from None
     return plots
+
+
+def _prepare_playback(path, steps):
+    """Fail before the work rather than after it."""
+    if path is None:
+        return
+    from attjax import playback
+
+    if steps > playback.MAX_STEPS:
+        raise cli.UserError(
+            f"--playback shows slews of at most {playback.MAX_STEPS:,} agent steps, and these "
+            f"have {steps:,}: give a shorter --duration or a larger --frameskip"
+        )
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise cli.UserError(f"--playback {path} cannot be written: it is no ordinary file")
+    _check_writable("--playback", path)
+    _check_writable("--playback", path.with_name(path.name + ".tmp"))  # as run_folder.replace does
+
+
+def _write_playback(arguments, controllers, env, params):
+    """The controller that is judged beside phase-plane, or that beside feedback."""
+    from attjax import playback
+
+    name = next(iter(controllers))
+    other = "feedback" if name == "phase-plane" else "phase-plane"
+    shown = {name: controllers[name], other: _controller(other, arguments, env.spacecraft)}
+    checkpoint = arguments.checkpoint.resolve().name if name == POLICY else None
+    page = playback.page(shown, env, params, arguments.seed or 0, checkpoint)
+    with run_folder.writing(arguments.playback):
+        run_folder.replace(arguments.playback, page)
+    print(f"wrote {arguments.playback}")
 
 
 def _spacecraft(arguments, names):
@@ -170,15 +211,15 @@ def _controller(name, arguments, spacecraft):
     return checkpoint.restore_policy(folder, update)
 
 
-def _check_writable(path):
+def _check_writable(flag, path):
     """Fail before the work rather than after it; leaves no new file behind."""
     if path is None:
         return
-    existed = path.exists()
     try:
+        existed = path.exists()
         path.open("a").close()
     except OSError as error:
-        raise cli.UserError(f"--json {path} cannot be written: {error.strerror}") from None
+        raise cli.UserError(f"{flag} {path} cannot be written: {error.strerror}") from None
     if not existed:
         path.unlink()
 

@@ -1,9 +1,10 @@
 import jax
+import pages
 import pytest
 from commands import STEPS_PER_UPDATE, TINY, run
 from fuzzing import Accepted
 
-from attjax import evaluation, training
+from attjax import evaluation, playback, training
 
 jax.config.update("jax_num_cpu_devices", 2)  # what is shared out over devices is tested on two
 jax.config.update("jax_legacy_prng_key", "error")  # typed keys throughout
@@ -42,3 +43,27 @@ def no_work(monkeypatch):
     monkeypatch.setattr(evaluation, "fly", accept)
     monkeypatch.setattr(training.Run, "train", accept)
     monkeypatch.setattr(training.Run, "describe", lambda *_: None)
+
+
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory):
+    with pages.chromium(tmp_path_factory.mktemp("chromium")) as driver:
+        yield driver
+
+
+@pytest.fixture(scope="session")
+def slews_html(tmp_path_factory):
+    """A page of eval.py --playback."""
+    path = tmp_path_factory.mktemp("page") / "slews.html"
+    env = pages.ENV
+    page = playback.page(pages.CONTROLLERS, env, env.default_params, 0, pages.HOSTILE)
+    path.write_text(page, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def browser(chromium, slews_html):
+    """The page freshly loaded; no test may leave an error on the console."""
+    chromium.get(slews_html.as_uri())
+    yield chromium
+    assert chromium.get_log("browser") == []

@@ -32,10 +32,11 @@ PLAUSIBLE = {"--" + name.replace("_", "-"): value for name, value in vars(preset
 PLAUSIBLE |= {
     "--preset": "paper", "--seed": 1, "--save-every": 2.5, "--frameskip": 7, "--duration": 1.5,
     "--controller": "feedback", "--json": "result.json", "--plot": "figures", "--episodes": 3,
+    "--playback": "slews.html",
 }  # fmt: skip
 TRAIN_FLAGS = [*SETTINGS, "--preset", "--seed", "--save-every", "--nonsense"]
 EVAL_FLAGS = ["--episodes", "--frameskip", "--duration", "--seed", "--controller"]
-EVAL_FLAGS += ["--json", "--plot", "--nonsense"]
+EVAL_FLAGS += ["--json", "--plot", "--playback", "--nonsense"]
 TRAIN_SWITCHES = [
     ["--resume"],
     ["--overwrite"],

@@ -23,7 +23,7 @@ LAYERS = [
     {"help_text", "panel"},
     {"progress", "metrics", "report", "cli", "flight_policy"},
     {"checkpoint", "config_file", "tensorboard"},
-    {"training", "plots", "export_c", "export_onnx", "export_stablehlo"},
+    {"training", "plots", "playback", "export_c", "export_onnx", "export_stablehlo"},
 ]
 LEARNING = {"networks", "losses", "learner", "rollout", "descent", "ppo"}
 SPACECRAFT = {"spacecraft", "reward", "env"}

@@ -1,0 +1,51 @@
+"""The page of eval.py --playback, and a browser that opens it."""
+
+import base64
+import json
+import re
+import shutil
+
+import jax
+import numpy as np
+import pytest
+
+from attjax import AttitudeEnv, controllers
+
+ENV = AttitudeEnv(frameskip=20)
+HOSTILE = "</script><script>alert(1)</script><!--\"'&$style"
+CONTROLLERS = {
+    "phase-plane": jax.tree_util.Partial(controllers.phase_plane),
+    "feedback": jax.tree_util.Partial(controllers.quaternion_feedback),
+}
+FLAGS = (
+    "headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run",
+    "disable-background-networking", "disable-component-update", "disable-sync",
+    "window-size=1280,900",
+)  # fmt: skip
+
+
+def embedded(page):
+    """The data of a page, with its flights as (slews, controllers, steps + 1, 10)."""
+    data = json.loads(re.search(r'id="flights">(.*?)</script>', page)[1])
+    flights = [[np.frombuffer(base64.b64decode(x), "<f4") for x in s] for s in data["flights"]]
+    data["flights"] = np.array(flights).reshape(len(flights), -1, data["steps"] + 1, 10)
+    return data
+
+
+def chromium(profile):
+    """Chromium without a window; skips the test where there is none."""
+    webdriver = pytest.importorskip("selenium.webdriver")
+    program = shutil.which("chromium") or shutil.which("google-chrome")
+    driver = shutil.which("chromedriver")
+    if not (program and driver):
+        pytest.skip("no Chromium with its chromedriver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = program
+    for flag in (*FLAGS, f"user-data-dir={profile}"):
+        options.add_argument(f"--{flag}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    return webdriver.Chrome(options, webdriver.ChromeService(driver))
+
+
+def find(browser, selector):
+    return browser.find_element("css selector", selector)
