@@ -1,6 +1,7 @@
 """The documentation holds: commands and examples run, links lead somewhere, names exist."""
 
 import ast
+import dataclasses
 import doctest
 import io
 import itertools
@@ -13,7 +14,9 @@ from commands import ROOT
 from markdown import COMMANDS, FENCE, Page
 
 import attjax
+from attjax import cli
 from attjax.presets import PRESETS
+from attjax.settings import Settings
 
 README = Page(ROOT / "README.md")
 INDEX = Page(ROOT / "docs" / "README.md")
@@ -151,6 +154,18 @@ def test_every_page_is_reached_from_the_index():
 def test_every_preset_is_described():
     for preset in PRESETS:
         assert f"| `{preset}` |" in README.path.read_text()
+
+
+def test_the_table_of_presets_is_of_the_presets():
+    text = (ROOT / "docs" / "concepts.md").read_text()
+    names = re.search(r"^\| \| `(precise.+)` \|$", text, re.MULTILINE)[1].split("` | `")
+    rows = re.findall(r"^\| `(\w+)` \| (.+) \|$", text, re.MULTILINE)
+    table = {setting: cells.split(" | ") for setting, cells in rows}
+    assert set(names) == set(PRESETS)
+    for field in dataclasses.fields(Settings):
+        values = [str(cli._show(getattr(PRESETS[name], field.name))) for name in names]
+        if field.name in table or len(set(values)) > 1:
+            assert table[field.name] == values, field.name
 
 
 API = re.findall(
