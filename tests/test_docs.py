@@ -33,14 +33,12 @@ def each(pages):
     return pytest.mark.parametrize("page", pages, ids=name)
 
 
-def blocks(language):
-    """The blocks of all pages in a language, as parameters: page, index among its blocks."""
-    return [
-        pytest.param(page, index, id=f"{name(page)}:{block.line}")
-        for page in PAGES
-        for index, block in enumerate(page.blocks)
-        if block.language == language
-    ]
+PROGRAMS = [
+    pytest.param(page, block, id=f"{name(page)}:{block.line}")
+    for page in PAGES
+    for block in page.blocks
+    if block.language == "python" and ">>> " not in block.text
+]
 
 
 @pytest.fixture
@@ -90,13 +88,10 @@ def test_blocks_have_a_language_and_are_none_of_a_list(page):
             assert not re.match(r"(-|\*|\d+\.) ", list(paragraph)[-1]), block
 
 
-@pytest.mark.parametrize("page, index", blocks("python"))
-def test_python_runs(page, index, clone):
+@pytest.mark.parametrize("page, block", PROGRAMS)
+def test_python_runs(page, block, clone):
     """A block runs by itself, and prints what the block of text right after it says."""
     doc_commands.write_files(page, clone)
-    block = page.blocks[index]
-    if ">>> " in block.text:
-        pytest.skip("a doctest")
     for peer in PEERS:
         if peer in block.text:
             pytest.importorskip(peer)
