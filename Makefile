@@ -7,7 +7,7 @@ EXTRAS ?= test
 CHECKPOINT ?= ckpt
 BIN := $(VENV)/bin
 
-.PHONY: train test test-all test-peers eval lint setup
+.PHONY: train test test-all test-peers eval lint docs setup
 
 train: setup
 	$(BIN)/python train.py --num-envs 2048 --checkpoint $(CHECKPOINT) $(ARGS)
@@ -32,9 +32,9 @@ test-all:
 # default Linux wheels hold CUDA; PIP_EXTRA_INDEX_URL can name an index of smaller ones.
 test-peers: $(VENV)-gym/installed $(VENV)-rejax/installed
 	$(VENV)-gym/bin/python -m pytest tests/test_gymnasium.py tests/test_sb3.py \
-	    tests/test_readme.py attjax/gymnasium_env.py attjax/sb3.py $(ARGS)
+	    tests/test_docs.py::test_python_runs attjax/gymnasium_env.py attjax/sb3.py $(ARGS)
 	$(VENV)-rejax/bin/python -m pytest tests/test_gymnax.py tests/test_gymnasium.py \
-	    tests/test_readme.py attjax/gymnax_compat.py $(ARGS)
+	    tests/test_docs.py::test_python_runs attjax/gymnax_compat.py $(ARGS)
 
 $(VENV)-gym/installed: PACKAGES = '.[test,gym]' torch stable-baselines3
 $(VENV)-rejax/installed: PACKAGES = '.[test]' gymnax rejax
@@ -47,9 +47,13 @@ lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
+# The API reference, from the docstrings, as HTML in site/.
+docs: $(VENV)/installed-docs,plot,onnx,gym
+	$(BIN)/python docs/reference.py site
+
 setup: $(VENV)/installed-$(EXTRAS)
 
-$(VENV)/installed-$(EXTRAS): pyproject.toml
+$(VENV)/installed-%: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$*]'
 	touch $@

@@ -83,3 +83,4 @@ def nearest_action(wanted_rate, observation, context: Context) -> chex.Array:
 
 
 CONTROLLERS = {"phase-plane": phase_plane, "feedback": quaternion_feedback}
+"""Controllers by the names that ``eval.py --controller`` knows."""

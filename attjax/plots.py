@@ -81,9 +81,10 @@ class Flight:
 
 
 def write_all(flight: Flight, folder: Path, metrics: list[dict]) -> list[Path]:
-    """Write every figure into the folder, the learning curve too where there are metrics.
+    """Write every figure into the folder, the learning curve too where there is one to draw.
 
-    ``metrics`` are rows of a run's metrics.csv, as strings.
+    ``metrics`` are rows of a run's metrics.csv, as strings; a short run ends before an episode
+    does, and then they say nothing of any.
     """
     folder.mkdir(parents=True, exist_ok=True)
     paths = [
@@ -93,7 +94,7 @@ def write_all(flight: Flight, folder: Path, metrics: list[dict]) -> list[Path]:
         distributions(flight, folder),
         settling(flight, folder),
     ]
-    if metrics:
+    if any(row["episode_return"] for row in metrics):
         paths.append(learning_curve(metrics, flight.is_the_papers, folder))
     return paths
 

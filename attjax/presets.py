@@ -84,3 +84,4 @@ PRECISE = Settings(
 """The default: one policy for every control rate, pointing far below Table 2."""
 
 PRESETS = {"precise": PRECISE, "paper": PAPER, "paper-fast": PAPER_FAST}
+"""Presets by the names that ``train.py --preset`` knows."""

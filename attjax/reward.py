@@ -98,3 +98,4 @@ def logarithmic_reward(transition: Transition) -> chex.Array:
 
 
 REWARDS = {"paper": paper_reward, "logarithmic": logarithmic_reward}
+"""Rewards by the names that settings and ``gymnasium.make`` know."""

@@ -39,6 +39,13 @@ def test_every_figure_is_written(flight, tmp_path):
         assert pixels.shape[0] > 500 and pixels[..., :3].std() > 0.01
 
 
+def test_a_run_in_which_no_episode_ended_has_no_learning_curve(flight, tmp_path, monkeypatch):
+    for name in ("slews", "final_seconds", "error_histories", "distributions", "settling"):
+        monkeypatch.setattr(plots, name, lambda *_: ())
+    rows = [{"agent_steps": "1000", "episode_return": ""}]
+    assert plots.write_all(flight, tmp_path, rows) == [(), (), (), ()]
+
+
 def test_recorded_slews_are_the_flown_ones(x64):
     """Histories and statistics come from two loops; they must tell of the same flights.
 

@@ -3,6 +3,8 @@
 import ast
 import importlib.metadata
 import socket
+import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,10 @@ SCRIPTS = [ROOT / name for name in ("train.py", "eval.py", "export.py")]
 SOURCES = [*(ROOT / "attjax").glob("*.py"), *SCRIPTS]
 MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
 MODULES |= {"socket", "urllib", "http", "requests", "ftplib"}
+CORE = {"jax", "jaxlib", "flax", "optax", "chex", "numpy", "orbax-checkpoint", "rich"}
+IMPORTED = {name.removesuffix("-checkpoint") for name in CORE}
+FOR_EXTRAS = {"plots", "gymnasium_env", "sb3", "gymnax_compat", "export_onnx", "export_stablehlo"}
+FOR_EXTRAS |= {"tensorboard"}
 CALLS = {"eval", "exec", "compile", "__import__"}
 
 
@@ -37,6 +43,35 @@ def test_installed_versions_are_within_the_ranges():
         assert {s.operator for s in requirement.specifier} == {">=", "<"}, requirement
         version = importlib.metadata.version(requirement.name)
         assert requirement.specifier.contains(version), (requirement, version)
+
+
+def test_the_core_needs_these_packages_and_no_others():
+    """What ``pip install attjax`` brings; whatever else is there is theirs, or an extra."""
+    required = [Requirement(text) for text in importlib.metadata.requires("attjax")]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert {r.name for r in map(Requirement, project["dependencies"])} == CORE
+    assert {r.name for r in required if r.marker is None or "extra" not in str(r.marker)} == CORE
+
+
+def test_core_modules_import_the_core_alone():
+    """The modules that import an extra's package are those that README.md names it for."""
+    for path in SOURCES:
+        if path.stem not in FOR_EXTRAS:
+            for package in third_party(ast.parse(path.read_text())):
+                assert package in IMPORTED, (path.name, package)
+
+
+def third_party(module):
+    """The packages that a module imports, wherever, but for the standard library and itself."""
+    for node in ast.walk(module):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [node.module]
+        else:
+            continue
+        packages = {name.split(".")[0] for name in names}
+        yield from packages - set(sys.stdlib_module_names) - {"attjax"}
 
 
 def test_training_and_evaluation_open_no_connection(tmp_path, monkeypatch):
