@@ -76,12 +76,13 @@ def print_comparison(results: list[dict], spacecraft: Spacecraft) -> None:
         table.add_row(name, *ours, *[_fixed(paper)] * with_paper)
     for name, (quantity, statistic) in OTHER_ROWS.items():
         values = [r[quantity][statistic] for r in results]
-        table.add_row(name, *("–" if x is None else f"{x:.2f}" for x in values))
+        form = ".3g" if quantity == "impulse_N_m_s" else ".2f"
+        table.add_row(name, *("–" if x is None else format(x, form) for x in values))
     console.print(table)
 
 
 def _console():
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False)
     console.width = max(console.width, TABLE_WIDTH)
     return console
 
@@ -142,7 +143,7 @@ def _summary(result):
             ),
         )
     yield "return", f"{returns['mean']:.1f} mean (Eq. 12-13)"
-    yield "impulse", f"{impulse['mean']:.3f} N m s mean"
+    yield "impulse", f"{impulse['mean']:.3g} N m s mean"
 
 
 def _fixed(value):

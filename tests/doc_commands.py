@@ -63,7 +63,8 @@ def known_flags() -> set[str]:
             script.parse_arguments(["--help"])
     scripts = [*ROOT.glob("benchmarks/*.py"), *map(ROOT.joinpath, CAMPAIGNS)]
     sources = [path.read_text() for path in scripts]
-    return set(re.findall(r"--[a-z][\w-]*", text.getvalue())) | {
+    help_text = text.getvalue().replace("--[no-]", "--")
+    return set(re.findall(r"--[a-z][\w-]*", help_text)) | {
         flag for source in sources for flag in re.findall(r'"(--[a-z][\w-]*)"', source)
     }
 
@@ -236,6 +237,7 @@ RUNS = {
 def prepare(folder: Path) -> None:
     """Make the folder like a clone, as far as commands read from it."""
     shutil.copytree(ROOT / "pretrained", folder / "pretrained")
+    shutil.copytree(ROOT / "docs" / "examples", folder / "docs" / "examples")
 
 
 def write_files(page: markdown.Page, folder: Path) -> None:

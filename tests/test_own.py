@@ -83,10 +83,13 @@ def test_a_policy_refuses_a_spacecraft_with_other_actions(trained, tmp_path, cap
 
 def test_a_policy_can_be_tried_on_another_spacecraft(trained, tmp_path, capsys):
     path = tmp_path / "heavier.toml"
-    path.write_text("inertia = [0.96, 0.13, 0.88]\ntorque_levels = [0.5, 0.05, 0.005]\n")
+    path.write_text(
+        'name = "[/heavier]"\n'
+        + "inertia = [0.96, 0.13, 0.88]\ntorque_levels = [0.5, 0.05, 0.005]\n"
+    )
     flags = ["--checkpoint", str(trained[0]), "--spacecraft", str(path), *SMALL]
     assert eval_script.main(flags) == 0
-    assert "heavier" in capsys.readouterr().out
+    assert "[/heavier]" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
