@@ -60,7 +60,7 @@ def test_the_users_functions_are_what_learns(monkeypatch):
     usual = AttitudeEnv(env.frameskip, logarithmic_reward)
     for action, impulse in ((1, 0.5 / 240), (0, 0.0)):
         own, expected = (e.step_env(None, state, action, params)[2] for e in (env, usual))
-        assert float(expected - own) == pytest.approx(300 * impulse, rel=1e-4)
+        assert float(expected - own) == pytest.approx(2e4 * impulse, rel=1e-4)
 
 
 def test_policies_with_features_of_their_own_export_as_stablehlo_alone(own, tmp_path):

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 
 from attjax import networks, reward
 
-PRICE = 300.0
+PRICE = 2e4
 """What an N m s costs; in the logarithmic reward, a decade of pointing earns 40 in a second."""
 
 
