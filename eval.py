@@ -178,19 +178,25 @@ def _write_playback(arguments, controllers, env, params):
 
 def _spacecraft(arguments, names):
     """What flies, with the duration that was asked for."""
+    _check_duration(arguments.duration, arguments.frameskip)
     if arguments.spacecraft is not None:
         spacecraft = config_file.read_spacecraft(arguments.spacecraft)
     elif POLICY in names:
         spacecraft = run_folder.read_config(arguments.checkpoint).spacecraft
     else:
         spacecraft = LM50
-    duration = spacecraft.duration if arguments.duration is None else arguments.duration
-    period = (arguments.frameskip + 1) * INTEGRATION_STEP
-    if duration < period * (1 - 1e-6):
+    if arguments.duration is not None:
+        spacecraft = dataclasses.replace(spacecraft, duration=arguments.duration)
+    _check_duration(spacecraft.duration, arguments.frameskip)
+    return spacecraft
+
+
+def _check_duration(duration, frameskip):
+    period = (frameskip + 1) * INTEGRATION_STEP
+    if duration is not None and duration < period * (1 - 1e-6):
         raise cli.UserError(
             f"--duration is {duration} s; it must hold at least one agent step of {period:.4g} s"
         )
-    return dataclasses.replace(spacecraft, duration=duration)
 
 
 def _controller(name, arguments, spacecraft):

@@ -17,6 +17,7 @@ FUSED, PHYSICS, USER = "attjax fused rollout", "attjax physics only", "attjax, u
 C_FULL, C_PHYSICS = "C ceiling, full step", "C ceiling, physics only"
 CEILINGS = (C_FULL, C_PHYSICS)
 NUMPY, NUMBA = "NumPy batch", "Numba batch"
+MAKE_VEC = "attjax, Gymnasium make_vec"
 GYM, BASILISK = "Numba RK4 in a Gym class", "Basilisk in an RL loop"
 
 
@@ -51,10 +52,28 @@ def find(device: str, cores: int) -> tuple[list[Contender], dict[str, str]]:
         Contender(USER, rollouts.users_scan),
     ]
     absent = {}
+    _add_make_vec(found, absent)
     if device == "cpu":
         for add in (_add_ceiling, _add_numpy, _add_numba, _add_basilisk):
             add(found, absent)
     return found, absent
+
+
+def _add_make_vec(found, absent):
+    try:
+        gymnasium = importlib.import_module("gymnasium")
+    except ImportError:
+        absent[MAKE_VEC] = "not installed (pip install gymnasium)"
+        return
+    name = importlib.import_module("attjax.gymnasium_env").ID
+
+    def build(num_envs):
+        envs = gymnasium.make_vec(name, num_envs=num_envs)
+        envs.reset(seed=0)
+        call = functools.partial(envs.step, batch.random_actions(1, num_envs)[0])
+        return Flight(call, num_envs, seconds(call))
+
+    found.append(Contender(MAKE_VEC, build))
 
 
 def _add_ceiling(found, absent):

@@ -11,6 +11,7 @@ COLORS = {
     "attjax fused rollout": "#d1495b",
     "attjax physics only": "#e8a0a8",
     "attjax, user's vmap+scan": "#edae49",
+    "attjax, Gymnasium make_vec": "#8c6d31",
     "Numba batch": "#00798c",
     "NumPy batch": "#30638e",
     "Numba RK4 in a Gym class": "#7a5195",

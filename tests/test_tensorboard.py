@@ -101,7 +101,8 @@ def test_hyperparameters_are_all_of_the_run(tmp_path):
     (value,) = session.summary.value
     data = HParamsPluginData.FromString(value.metadata.plugin_data.content)
     shown = data.session_start_info.hparams
-    assert set(shown) == {"preset", "seed", *vars(CONFIG.settings)}
+    assert set(shown) == {"preset", "seed", "spacecraft", *vars(CONFIG.settings)}
+    assert shown["spacecraft"].string_value == "LM50"
     assert shown["preset"].string_value == CONFIG.preset
     assert shown["clip"].number_value == CONFIG.settings.clip
     assert shown["frameskips"].string_value == ",".join(map(str, CONFIG.settings.frameskips))
