@@ -14,7 +14,11 @@ INTEGRATION_STEP = 1 / 240
 NEEDED = ("inertia", "torque_levels")
 """What a file that describes another spacecraft than LM50 must give."""
 
-LEAST_MOMENT, MOST_MOMENT = 1e-9, 1e9
+LEAST_MOMENT, MOST_MOMENT, LEAST_RATIO = 1e-9, 1e9, 1e-5
+ROUNDING = 1e-6
+"""Less than what the simulator's own checks let pass, in single precision."""
+
+LARGEST = 1e30
 MOST_ACTIONS = 1000
 MOST_DURATION = 1e6
 
@@ -93,7 +97,12 @@ class Spacecraft:
                 f"inertia has principal moments {shown}; "
                 f"they must be from {LEAST_MOMENT:g} to {MOST_MOMENT:g}"
             )
-        if moments[2] > (moments[0] + moments[1]) * (1 + 1e-5):
+        if moments[0] < LEAST_RATIO * moments[2]:
+            raise ValueError(
+                f"inertia has principal moments {shown}; the least must be at least "
+                f"{LEAST_RATIO:g} of the largest"
+            )
+        if moments[2] > (moments[0] + moments[1]) * (1 + ROUNDING):
             raise ValueError(
                 f"inertia has principal moments {shown}; none may exceed the other two together"
             )
@@ -183,7 +192,7 @@ def _check_numbers(name, values, low=-math.inf, high=math.inf, count=None):
     if not is_tuple or not all(map(_is_number, values)):
         listed = "a list of numbers" if count is None else f"{count} numbers"
         raise ValueError(f"{name} is {_shown(values)}; it must be {listed}")
-    if not all(low <= x <= high and math.isfinite(x) for x in values):
+    if not all(low <= x <= high and abs(x) <= LARGEST for x in values):
         allowed = "finite" if math.isinf(high) else f"from {low:g} to {high:g}"
         raise ValueError(f"{name} is {_shown(values)}; they must be {allowed}")
 
@@ -204,7 +213,7 @@ def _principal_moments(rows):
     import numpy as np  # imported late: the usual inertia is three moments
 
     tensor = np.array(rows, float)
-    if not np.allclose(tensor, tensor.T, rtol=0, atol=1e-5 * np.max(np.abs(tensor))):
+    if not np.allclose(tensor, tensor.T, rtol=0, atol=ROUNDING * np.max(np.abs(tensor))):
         raise ValueError(f"inertia is {_shown(rows)}; it must be symmetric")
     return np.linalg.eigvalsh(tensor).tolist()
 

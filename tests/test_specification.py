@@ -1,13 +1,28 @@
 """A user's own spacecraft."""
 
+import dataclasses
+import tomllib
+
+import hypothesis
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from bodies import rotated_inertia
+from hypothesis import strategies as st
 
 import attjax
-from attjax import AttitudeEnv, Spacecraft, controllers, evaluation, networks, specification
+from attjax import (
+    AttitudeEnv,
+    Spacecraft,
+    config_file,
+    controllers,
+    evaluation,
+    networks,
+    specification,
+)
+from attjax.presets import PAPER
+from attjax.run_folder import Config
 from attjax.specification import LM50
 
 CUBESAT = Spacecraft(
@@ -120,6 +135,8 @@ def test_a_file_is_read(tmp_path):
         ({"inertia": [1, 2]}, r"inertia is \[1, 2\]; it must be 3 numbers"),
         ({"inertia": [[1, 0, 0], [0, 1, 0], [0, 0.1, 1]]}, "it must be symmetric"),
         ({"inertia": [1, 1, 3]}, "none may exceed the other two together"),
+        ({"inertia": [1e-6, 1, 1]}, "the least must be at least 1e-05 of the largest"),
+        ({"inertia": [10**400, 1, 1]}, "they must be finite"),
         ({"inertia": [-1, 1, 1]}, "principal moments -1, 1, 1; they must be from 1e-09 to 1e"),
         ({"inertia": [[float("nan"), 0, 0], [0, 1, 0], [0, 0, 1]]}, "they must be finite"),
         ({"torque_levels": []}, "it must be a list of numbers"),
@@ -141,3 +158,45 @@ def test_a_file_is_read(tmp_path):
 def test_bad_descriptions(values, expected):
     with pytest.raises(ValueError, match=expected):
         specification.from_lists(values)
+
+
+FASTEST = dataclasses.replace(PAPER, frameskips=(0,))
+ODD = st.sampled_from([None, True, "x", [], {}, -1, 0, 1e-40, 1e40, 10**400, float("nan"), [[1]]])
+THREE = st.lists(st.floats(-1e12, 1e12), min_size=3, max_size=3)
+MOMENTS = st.lists(st.floats(1.0, 2.0), min_size=3, max_size=3)  # any three are a body's
+SCALE = st.sampled_from([1e-9, 1e-4, 1.0, 4e8])
+VALUES = {
+    "inertia": st.one_of(
+        st.builds(lambda moments, scale: [x * scale for x in moments], MOMENTS, SCALE),
+        st.lists(THREE, min_size=3, max_size=3),
+    ),
+    "torque_levels": st.lists(st.floats(1e-12, 1e6), min_size=1, max_size=4),
+    "torque_axes": st.lists(THREE, min_size=1, max_size=4),
+    "torque_held": st.booleans(),
+    "rate_limit": st.floats(1e-6, 1e3),
+    "goal_angle_deg": st.floats(1e-6, 180),
+    "slew_angles_deg": st.lists(st.floats(0, 180), min_size=2, max_size=2).map(sorted),
+    "duration": st.floats(1 / 240, 1e6),
+    "name": st.text(max_size=3),
+}
+
+
+@hypothesis.settings(max_examples=150, deadline=None)
+@hypothesis.given(
+    values=st.fixed_dictionaries({}, optional=VALUES),
+    odd=st.dictionaries(st.sampled_from([*VALUES, "mass"]), ODD, max_size=1),
+)
+def test_any_description_is_flown_or_refused_in_a_line(values, odd):
+    try:
+        spacecraft = specification.from_lists(values | odd)
+    except ValueError as error:
+        assert "\n" not in str(error) and str(error)
+        hypothesis.event("refused")
+        return
+    hypothesis.event("flown")
+    env = AttitudeEnv(0, spacecraft=spacecraft)
+    observation, state = env.reset(jax.random.key(0), env.default_params)
+    after = env.step_env(None, state, env.num_actions - 1, env.default_params)[0]
+    assert np.all(np.isfinite(observation)) and np.all(np.isfinite(after))
+    again = tomllib.loads(config_file.text(Config("paper", 0, FASTEST, spacecraft)))["spacecraft"]
+    assert specification.from_lists(again) == spacecraft
