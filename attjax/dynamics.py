@@ -177,9 +177,8 @@ def _change_in_line(kind, *parts):
 
 def _change_with(call, unroll, kind, start, acceleration, gyroscopic, limit):
     frameskip, held = kind
-    later_step, later_torque = (_held_step, acceleration) if held else (_coasting_step, ())
-    if limit:
-        later_step = _due_held_step if held else _due_coasting_step
+    later_step = functools.partial(_due_later_step if limit else _later_step, held)
+    later_torque = acceleration if held else ()
 
     def step(change, index):
         due = (index, *limit) if limit else ()
@@ -195,37 +194,21 @@ def _torque_step(*scalars):
     return _rk4_increment(scalars[:7], scalars[10:], scalars[7:10], INTEGRATION_STEP)
 
 
-def _coasting_step(*scalars):
-    """Change after one more RK4 step; scalars: start (7), change so far (7), inertia terms."""
-    start, change, gyroscopic = scalars[:7], scalars[7:14], scalars[14:]
-    state = _add(start, change)
-    return _add(change, _rk4_increment(state, gyroscopic, None, INTEGRATION_STEP))
+def _later_step(held, *scalars):
+    """Change after one more RK4 step.
 
-
-def _held_step(*scalars):
-    """The same under torque; scalars: start (7), change (7), I⁻¹ M (3), inertia terms."""
-    start, change, acceleration, gyroscopic = (
-        scalars[:7],
-        scalars[7:14],
-        scalars[14:17],
-        scalars[17:],
-    )
+    Scalars: start (7), change so far (7), I⁻¹ M (3) if the torque is held, inertia terms.
+    """
+    start, change, later = scalars[:7], scalars[7:14], scalars[14:]
+    acceleration, gyroscopic = (later[:3], later[3:]) if held else (None, later)
     state = _add(start, change)
     return _add(change, _rk4_increment(state, gyroscopic, acceleration, INTEGRATION_STEP))
 
 
-def _due_coasting_step(index, limit, *scalars):
-    """A coasting step if it is one of the first ``limit`` steps, else no further change."""
-    return _if_due(index < limit, scalars[7:14], _coasting_step(*scalars))
-
-
-def _due_held_step(index, limit, *scalars):
-    """The same of a step under torque."""
-    return _if_due(index < limit, scalars[7:14], _held_step(*scalars))
-
-
-def _if_due(is_due, change, later):
-    return tuple(jnp.where(is_due, b, a) for a, b in zip(change, later))
+def _due_later_step(held, index, limit, *scalars):
+    """The same if it is one of the first ``limit`` steps, else no further change."""
+    change, later = scalars[7:14], _later_step(held, *scalars)
+    return tuple(jnp.where(index < limit, b, a) for a, b in zip(change, later))
 
 
 def _add(state, change):
