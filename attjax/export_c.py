@@ -1,12 +1,9 @@
 """A policy as C99 for flight software: a header and a source, and a test program beside them."""
 
-from importlib import resources
-from string import Template
-
 import numpy as np
 
 import attjax
-from attjax import flight_policy, networks
+from attjax import flight_policy, networks, template
 from attjax.flight_policy import FlightPolicy
 
 POLICY_FILES = ("attjax_policy.h", "attjax_policy.c")
@@ -74,9 +71,8 @@ def operations(flight: FlightPolicy) -> dict[str, int]:
 
 
 def _fill(name, values):
-    """A template of this package with its $names replaced."""
-    text = resources.files("attjax").joinpath("templates", name).read_text(encoding="utf-8")
-    return Template(text).substitute(values, version=attjax.__version__)
+    """A template with these values, and the version that all of them may name."""
+    return template.fill(name, version=attjax.__version__, **values)
 
 
 def _header_values(flight):

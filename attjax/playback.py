@@ -2,15 +2,13 @@
 
 import base64
 import json
-from importlib import resources
-from string import Template
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 import attjax
-from attjax import evaluation
+from attjax import evaluation, template
 from attjax import quaternion as quaternions
 from attjax.env import AttitudeEnv
 from attjax.evaluation import TABLE_5, Controller
@@ -62,11 +60,11 @@ def page(
         "slews": _slew_names(start),
         "flights": [[_encoded(one) for one in slew] for slew in zip(*histories)],
     }
-    scripts = "\n".join(_template(f"playback_{name}.js") for name in SCRIPTS)
+    scripts = "\n".join(template.read(f"playback_{name}.js") for name in SCRIPTS)
     # "<" would let a name end the element that holds it.
     flights = json.dumps(content).replace("<", "\\u003c")
-    html = Template(_template("playback.html"))
-    return html.substitute(style=_template("playback.css"), script=scripts, flights=flights)
+    style = template.read("playback.css")
+    return template.fill("playback.html", style=style, script=scripts, flights=flights)
 
 
 def _starts(env, params, seed) -> EnvState:
@@ -91,7 +89,3 @@ def _samples(start, history):
 
 def _encoded(samples):
     return base64.b64encode(samples.astype("<f4").tobytes()).decode()
-
-
-def _template(name):
-    return resources.files("attjax").joinpath("templates", name).read_text(encoding="utf-8")

@@ -8,7 +8,7 @@ from pathlib import Path
 import attjax
 
 LAYERS = [
-    {"user_functions", "specification", "checks", "spaces", "kernel", "vector", "sb3"},
+    {"user_functions", "specification", "template", "checks", "spaces", "kernel", "vector", "sb3"},
     {"settings", "programs", "context"},
     {"quaternion", "rigid_body"},
     {"dynamics"},
