@@ -134,6 +134,15 @@ def test_links_lead_somewhere(page):
         assert not anchor or anchor in Page(target).anchors, link
 
 
+@pytest.mark.parametrize(
+    "path", (ROOT / "docs" / "examples").glob("*.*"), ids=lambda path: path.name
+)
+def test_files_of_examples_are_shown_as_they_are(path):
+    """But for what a file says of itself at its top."""
+    shown = [block.text.strip() for page in PAGES for block in page.blocks]
+    assert any(text and path.read_text().strip().endswith(text) for text in shown)
+
+
 def test_every_page_is_reached_from_the_index():
     reached, following = {README.path}, [INDEX.path]  # the README's own links do not count
     while following:
