@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from attjax import cli, config_file, help_text, run_folder
+from attjax import cli, config_file, help_text, run_folder, settings
 from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
 
 POLICY = "policy"
@@ -34,8 +34,7 @@ def parse_arguments(argv):
 
 def _add_who(group):
     cli.add_checkpoint(group)
-    best_help = "the checkpoint with the least terminal error in training, not the newest"
-    group.add_argument("--best", action="store_true", help=best_help)
+    cli.add_best(group)
     who = group.add_mutually_exclusive_group()
     controller_help = "the trained policy (default), or a classical controller, without checkpoint"
     who.add_argument(
@@ -48,7 +47,7 @@ def _add_who(group):
 def _add_conditions(group):
     cli.add_number(group, "episodes", int, 5000, "number of random slews", low=1, high=10**7)
     frameskip_help = "RK4 steps of 1/240 s after the first of a decision, for 240/(N + 1) Hz"
-    cli.add_number(group, "frameskip", int, 5, frameskip_help, low=0, below=10_500)
+    cli.add_number(group, "frameskip", int, 5, frameskip_help, **settings.FRAMESKIP)
     craft_help = (
         "TOML file of the spacecraft that flies (default: the one that the policy was trained on; "
         "LM50 for a classical controller)"

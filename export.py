@@ -4,7 +4,7 @@ import importlib
 import sys
 from pathlib import Path
 
-from attjax import cli, help_text, run_folder
+from attjax import cli, help_text, run_folder, settings
 
 FORMATS = {"c": "export_c", "onnx": "export_onnx", "stablehlo": "export_stablehlo"}
 NEEDED = {"export_onnx": "onnx", "export_stablehlo": "flatbuffers"}
@@ -25,10 +25,9 @@ def parse_arguments(argv):
 
 def _add_what(group):
     cli.add_checkpoint(group)
-    best_help = "the checkpoint with the least terminal error in training, not the newest"
-    group.add_argument("--best", action="store_true", help=best_help)
+    cli.add_best(group)
     frameskip_help = "control rate of the flight software, 240/(N + 1) Hz"
-    cli.add_number(group, "frameskip", int, 5, frameskip_help, low=0, below=10_500)
+    cli.add_number(group, "frameskip", int, 5, frameskip_help, **settings.FRAMESKIP)
     cli.add_seed_and_device(group, "seed of the slews that test vectors come from")
 
 

@@ -112,23 +112,30 @@ def _new_config(preset=DEFAULT_PRESET, seed=0, spacecraft=LM50, **settings):
 def _open(arguments, given, new, stop):
     """The folder's run, new or continued."""
     # Imported late: with it, --help and errors in the arguments would take seconds.
-    from attjax import assembly, training
+    from attjax import training
 
     folder = arguments.checkpoint
     resumes = arguments.resume and run_folder.holds_run(folder)
     if not resumes:
-        # A user's function that cannot be used fails here, before a run gives way to this one.
-        assembly.setup(new.settings, new.spacecraft)
+        # Before a run gives way to this one: it fails where a user's function cannot be used.
+        setup = _setup(new)
         run_folder.create(folder, new, arguments.overwrite)
-        run = training.Run(folder, new, stop)
+        run = training.Run(folder, new, setup, stop)
     else:
         old = run_folder.read_config(folder)
         longer = _resumed_config(given, old)
-        run = training.Run(folder, longer, stop)
+        run = training.Run(folder, longer, _setup(longer), stop)
         if longer != old:
             run.announce_longer(old.settings)
             run_folder.write_config(folder, longer)
     return run
+
+
+def _setup(config):
+    from attjax import assembly
+
+    num_devices = assembly.num_devices(config.settings)
+    return assembly.setup(config.settings, config.spacecraft, num_devices)
 
 
 def _resumed_config(given, config):

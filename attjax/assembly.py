@@ -29,10 +29,8 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
     """
     features = settings.features
     if features not in FEATURES:
-        features = user_functions.resolve(features, FEATURES)
-        call = functools.partial(
-            jax.eval_shape, features, *_first_sight(AttitudeEnv(0, spacecraft=craft))
-        )
+        features = user_functions.resolve(features)
+        call = functools.partial(jax.eval_shape, features, *_first_sight(craft))
         user_functions.check(f"features {settings.features}", call, rank=1)
     return Policy(features, settings.hidden_sizes, craft.num_actions, settings.rate_margin)
 
@@ -43,14 +41,16 @@ def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) ->
     Raises:
         FunctionError: the reward or the features are a user's function that cannot be used.
     """
-    reward = user_functions.resolve(settings.reward, REWARDS)
+    reward = REWARDS.get(settings.reward) or user_functions.resolve(settings.reward)
     start = spacecraft.initial_state
     if settings.near_goal_share > 0:
         start = spacecraft.NearGoalStarts(settings.near_goal_share, settings.near_goal_steps)
     env = AttitudeEnv(max(settings.frameskips), reward, start, craft)
     if settings.reward not in REWARDS:
-        call = functools.partial(jax.eval_shape, functools.partial(_first_reward, env))
-        user_functions.check(f"reward {settings.reward}", call, rank=0)
+        first_reward = functools.partial(_first_reward, env)
+        user_functions.check(
+            f"reward {settings.reward}", lambda: jax.eval_shape(first_reward), rank=0
+        )
     groups = len(settings.frameskips)
     return learner.Setup(env, policy(settings, craft), settings, groups, num_devices)
 
@@ -60,8 +60,9 @@ def _first_reward(env):
     return env.step_env(key, env.reset(key, params)[1], 0, params)[2]
 
 
-def _first_sight(env):
-    """An observation and a context, as features have them."""
+def _first_sight(craft):
+    """An observation and a context of a spacecraft, as features have them."""
+    env = AttitudeEnv(0, spacecraft=craft)
     params = env.default_params
     return env.reset(jax.random.key(0), params)[0], env.context(params)
 
@@ -93,5 +94,4 @@ def env_params(setup: learner.Setup) -> spacecraft.EnvParams:
 
 def initial_parameters(policy: Policy, craft: Spacecraft = LM50) -> dict:
     """Parameters of the right shapes for a policy that flies the spacecraft."""
-    sight = _first_sight(AttitudeEnv(frameskip=0, spacecraft=craft))
-    return policy.init(jax.random.key(0), jax.random.key(1), *sight)
+    return policy.init(jax.random.key(0), jax.random.key(1), *_first_sight(craft))

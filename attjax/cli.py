@@ -89,9 +89,15 @@ def add_checkpoint(group) -> None:
     )
 
 
+def add_best(group) -> None:
+    """Add --best, which belongs beside --checkpoint."""
+    best_help = "the checkpoint with the least terminal error in training, not the newest"
+    group.add_argument("--best", action="store_true", help=best_help)
+
+
 def add_seed_and_device(group, seed_help: str) -> None:
     """Add --seed and --device."""
-    add_number(group, "seed", int, None, f"{seed_help} (default: 0)", low=0, below=2**32)
+    add_number(group, "seed", int, None, f"{seed_help} (default: 0)", **settings.SEED)
     device_help = "where to compute (default: auto, a GPU if JAX finds one)"
     group.add_argument("--device", choices=DEVICES, default="auto", help=device_help)
 

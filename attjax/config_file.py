@@ -15,7 +15,7 @@ from attjax.specification import Spacecraft
 SETTINGS = {field.name: field for field in dataclasses.fields(settings.Settings)}
 OTHERS = (
     settings.single("preset", str, "the recipe", choices=tuple(presets.PRESETS)),
-    settings.single("seed", int, "of everything random", low=0, below=2**32),
+    settings.single("seed", int, "of everything random", **settings.SEED),
 )
 FIELDS = SETTINGS | {field.name: field for field in OTHERS}
 

@@ -9,6 +9,10 @@ import math
 
 from attjax import user_functions
 
+SEED = {"low": 0, "below": 2**32}
+FRAMESKIP = {"low": 0, "below": 10_500}
+"""Limits of each, as in :func:`setting`."""
+
 MOST_SAMPLES = 2**27
 """Of an update: some 100 GB."""
 
@@ -64,8 +68,7 @@ class Settings:
     frameskips: tuple[int, ...] = _task(
         "torque-free RK4 steps of 1/240 s after an impulse, k of them for 240/(k + 1) Hz; the "
         "spacecraft are shared out evenly among several values",
-        low=0,
-        below=10_500,
+        **FRAMESKIP,
         most=64,
     )
     reward: str = _task(

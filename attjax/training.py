@@ -19,17 +19,16 @@ class Run:
     Args:
         folder: where its checkpoints and metrics are; open.
         config: what it was started with.
+        setup: made of it.
         stop: says when to end after a block.
 
     Raises:
         FolderError: the folder's checkpoint or metrics cannot be read.
     """
 
-    def __init__(self, folder: Path, config: Config, stop: cli.StopSignals):
+    def __init__(self, folder: Path, config: Config, setup: learner.Setup, stop: cli.StopSignals):
         self.folder, self.config, self.settings, self.stop = folder, config, config.settings, stop
-        num_devices = assembly.num_devices(self.settings)
-        self.setup = assembly.setup(self.settings, config.spacecraft, num_devices)
-        self.env_params = assembly.env_params(self.setup)
+        self.setup, self.env_params = setup, assembly.env_params(setup)
         self.learner = learner.init(self.setup, self.env_params, jax.random.key(config.seed))
         if checkpoint.latest(folder) is not None:
             self.learner = checkpoint.restore_learner(folder, self.learner)

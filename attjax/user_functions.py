@@ -5,7 +5,7 @@ import pkgutil
 import re
 import sys
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
@@ -19,20 +19,16 @@ def is_name(x) -> bool:
     return isinstance(x, str) and NAME.fullmatch(x) is not None
 
 
-def resolve(name: str, known: Mapping[str, Callable]) -> Callable:
-    """The function of a name: one of the ``known``, or a user's.
-
-    A user's module is found as in any import, and in the current folder.
+def resolve(name: str) -> Callable:
+    """The function of a name; its module is found as in any import, and in the current folder.
 
     Raises:
         FunctionError: there is no such function, or its module cannot be imported.
 
     Example:
-        >>> resolve("math:sqrt", {})(9)
+        >>> resolve("math:sqrt")(9)
         3.0
     """
-    if name in known:
-        return known[name]
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
     try:

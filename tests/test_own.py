@@ -194,4 +194,4 @@ def test_names_of_functions():
     ):
         assert not user_functions.is_name(name)
     with pytest.raises(FunctionError):
-        user_functions.resolve("math:pi", {})
+        user_functions.resolve("math:pi")
