@@ -14,7 +14,7 @@ INTEGRATION_STEP = 1 / 240
 NEEDED = ("inertia", "torque_levels")
 """What a file that describes another spacecraft than LM50 must give."""
 
-LEAST_MOMENT, MOST_MOMENT, LEAST_RATIO = 1e-9, 1e9, 1e-5
+LEAST_MOMENT, MOST_MOMENT, LEAST_RATIO = 1e-9, 1e9, 1e-3
 ROUNDING = 1e-6
 """Less than what the simulator's own checks let pass, in single precision."""
 
@@ -35,7 +35,7 @@ class Spacecraft:
         torque_axes: directions of these torques in the body frame; they are normalised.
         torque_held: whether a torque lasts the whole control period, as of reaction wheels, or
             1/240 s at its beginning, as in the paper.
-        rate_limit: ‖ω‖ that ends an episode when exceeded, rad/s.
+        rate_limit: ‖ω‖ that ends an episode when exceeded, rad/s; no torque may pass it in 1/240 s.
         goal_angle_deg: largest error angle that counts as pointing, degrees.
         slew_angles_deg: least and largest initial error angle, degrees.
         duration: of an episode, s.
@@ -68,10 +68,16 @@ class Spacecraft:
             raise ValueError(f"name is {self.name!r}; it must be a line of text")
         if not isinstance(self.torque_held, bool):
             raise ValueError(f"torque_held is {self.torque_held!r}; it must be true or false")
-        self._check_inertia()
+        least_moment = self._check_inertia()
         _check_numbers("torque_levels", self.torque_levels, 1e-12, 1e6)
         self._check_axes()
-        _check_number("rate_limit", self.rate_limit, 1e-6, 1e3)
+        _check_number("rate_limit", self.rate_limit, 1e-6, 100)
+        kick = max(self.torque_levels) * INTEGRATION_STEP / least_moment
+        if kick > self.rate_limit:
+            raise ValueError(
+                f"torque_levels has {max(self.torque_levels):g}, which changes the rate by up to "
+                f"{kick:.3g} rad/s in 1/240 s; it must be at most rate_limit, {self.rate_limit:g}"
+            )
         _check_number("goal_angle_deg", self.goal_angle_deg, 1e-6, 180)
         _check_numbers("slew_angles_deg", self.slew_angles_deg, 0, 180, count=2)
         if self.slew_angles_deg[0] > self.slew_angles_deg[1]:
@@ -83,6 +89,7 @@ class Spacecraft:
         return self.name
 
     def _check_inertia(self):
+        """Check it; returns the least principal moment."""
         rows = self.inertia
         if isinstance(rows, tuple) and len(rows) == 3 and isinstance(rows[0], tuple):
             for row in rows:
@@ -106,6 +113,7 @@ class Spacecraft:
             raise ValueError(
                 f"inertia has principal moments {shown}; none may exceed the other two together"
             )
+        return moments[0]
 
     def _check_axes(self):
         axes = self.torque_axes
