@@ -135,7 +135,7 @@ def test_links_lead_somewhere(page):
 
 
 @pytest.mark.parametrize(
-    "path", (ROOT / "docs" / "examples").glob("*.*"), ids=lambda path: path.name
+    "path", sorted((ROOT / "docs" / "examples").glob("*.*")), ids=lambda path: path.name
 )
 def test_files_of_examples_are_shown_as_they_are(path):
     """But for what a file says of itself at its top."""
