@@ -1,6 +1,7 @@
 """What a controller knows of the spacecraft it steers, beside the observation."""
 
 import chex
+import jax.numpy as jnp
 from flax import struct
 
 from attjax.specification import INTEGRATION_STEP
@@ -23,3 +24,8 @@ class Context:
     torque_table: chex.Array
     rate_limit: chex.Array
     torque_duration: chex.Array = INTEGRATION_STEP
+
+    @property
+    def largest_torque(self) -> chex.Array:
+        """The largest magnitude in the torque table, N m."""
+        return jnp.sqrt(jnp.max(jnp.sum(self.torque_table**2, axis=-1)))

@@ -58,15 +58,14 @@ def quaternion_feedback(observation: chex.Array, context: Context) -> chex.Array
     observation = checks.real("observation", observation, (observations.SIZE,))
     quaternion = observation[observations.QUATERNION]
     sign = jnp.where(quaternion[3] < 0, -1.0, 1.0).astype(quaternion.dtype)
-    largest = jnp.max(context.inertia)
+    largest = jnp.max(rigid_body.principal_moments(context.inertia))
     bandwidth = FEEDBACK_BANDWIDTH * jnp.sqrt(average_torque(context) / (jnp.pi * largest))
     return nearest_action(-2 * bandwidth * sign * quaternion[:3], observation, context)
 
 
 def average_torque(context: Context) -> chex.Array:
     """Largest torque, averaged over a control period, N m: it may act for a part of it."""
-    largest = jnp.max(jnp.sqrt(jnp.sum(context.torque_table**2, axis=-1)))
-    return largest * context.torque_duration / context.control_period
+    return context.largest_torque * context.torque_duration / context.control_period
 
 
 def nearest_action(wanted_rate, observation, context: Context) -> chex.Array:

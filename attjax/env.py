@@ -69,7 +69,7 @@ class AttitudeEnv:
     def context(self, params: EnvParams) -> Context:
         """What a controller may know of this environment."""
         period = self._period(params)
-        duration = period if self.spacecraft.torque_held else INTEGRATION_STEP
+        duration = period if params.torque_held else INTEGRATION_STEP
         return Context(period, params.inertia, params.torque_table, params.rate_limit, duration)
 
     def _period(self, params):
@@ -128,8 +128,7 @@ class AttitudeEnv:
             the spacecraft after the step and is meant to be read at an episode's end.
         """
         del key
-        held = self.spacecraft.torque_held
-        next_state = spacecraft.step(state, action, params, self.frameskip, held)
+        next_state = spacecraft.step(state, action, params, self.frameskip)
         rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2))
         terminated = rate > params.rate_limit
         truncated = ~terminated & (next_state.time >= params.max_steps_in_episode)
@@ -163,8 +162,8 @@ class AttitudeEnv:
         Coasting can raise ‖ω‖ at constant energy by at most √(I_max/I_min).
         """
         moments = rigid_body.principal_moments(params.inertia)
-        impulse = jnp.max(jnp.abs(params.torque_table)) * self.context(params).torque_duration
-        kick = impulse / jnp.min(moments)
+        context = self.context(params)
+        kick = context.largest_torque * context.torque_duration / jnp.min(moments)
         rate = (params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))
         one = jnp.ones_like(rate)
         high = jnp.stack([one] * 4 + [rate / 2] * 4 + [rate] * 3)

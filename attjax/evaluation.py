@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
+from attjax import numerics, rigid_body, spacecraft
 from attjax import observation as observations
 from attjax import quaternion as quaternions
-from attjax import rigid_body, spacecraft
 from attjax.context import Context
 from attjax.controllers import average_torque
 from attjax.env import AttitudeEnv
@@ -96,7 +96,7 @@ def fly(
     context = env.context(params)
 
     def step(index, carry):
-        observation, state, so_far = carry
+        observation, state, so_far, excess = carry
         action = jax.vmap(controller, (0, None))(observation, context)
         next_observation, next_state, _, terminated, info = jax.vmap(
             env.step_env, (None, 0, 0, None)
@@ -105,6 +105,8 @@ def fly(
         rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2, axis=-1))
         torque = jnp.sqrt(jnp.sum(params.torque_table[action] ** 2, axis=-1))
         closer = angle < so_far.closest_angle
+        score = numerics.add((so_far.score, excess[0]), info["score"])
+        impulse = numerics.add((so_far.impulse, excess[1]), torque * context.torque_duration)
         updated = Episodes(
             closest_angle=jnp.where(closer, angle, so_far.closest_angle),
             closest_rate=jnp.where(closer, rate, so_far.closest_rate),
@@ -112,17 +114,17 @@ def fly(
             terminal_rate=rate,
             overspeed=terminated,
             last_outside=jnp.where(angle > params.goal_angle, index + 1, so_far.last_outside),
-            score=so_far.score + info["score"],
-            impulse=so_far.impulse + torque * context.torque_duration,
+            score=score[0],
+            impulse=impulse[0],
         )
         ended = so_far.overspeed
         so_far = jax.tree.map(lambda old, new: jnp.where(ended, old, new), so_far, updated)
-        return next_observation, next_state, so_far
+        return next_observation, next_state, so_far, (score[1], impulse[1])
 
     zero = jnp.zeros(episodes, observation.dtype)
     start = Episodes(zero + jnp.inf, zero, zero, zero, zero > 0, zero.astype(jnp.int32), zero, zero)
     steps = params.max_steps_in_episode
-    return jax.lax.fori_loop(0, steps, step, (observation, state, start))[2]
+    return jax.lax.fori_loop(0, steps, step, (observation, state, start, (zero, zero)))[2]
 
 
 @functools.partial(jax.jit, static_argnames=("env", "steps"))
@@ -130,13 +132,12 @@ def record(
     controller: Controller, env: AttitudeEnv, params: EnvParams, start: EnvState, steps: int
 ) -> History:
     """Fly slews from a batch of states without ending them early, and keep every step."""
-    held = env.spacecraft.torque_held
 
     def step(state, _):
         observation = jax.vmap(observations.observe)(state.quaternion, state.angular_velocity)
         action = jax.vmap(controller, (0, None))(observation, env.context(params))
         state = jax.vmap(
-            lambda state, action: spacecraft.step(state, action, params, env.frameskip, held)
+            lambda state, action: spacecraft.step(state, action, params, env.frameskip)
         )(state, action)
         return state, History(state.quaternion, state.angular_velocity, params.torque_table[action])
 
@@ -192,7 +193,7 @@ def time_optimal_reference(quaternion: chex.Array, context: Context) -> chex.Arr
     """
     angle = quaternions.rotation_vector(quaternion)
     momentum = jnp.abs(rigid_body.angular_momentum(context.inertia, angle))
-    return 2 * jnp.sqrt(jnp.sum(momentum) / average_torque(context))
+    return 2 * numerics.square_root(jnp.sum(momentum) / average_torque(context))
 
 
 def summarize(x: np.ndarray) -> dict:

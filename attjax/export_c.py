@@ -125,7 +125,7 @@ def _allow_function(flight):
         "form": _table(mask.form),
         "impulse": _table(mask.impulse),
         "own_gain": _table(mask.own_gain),
-        "limit_squared": _number(mask.limit_squared),
+        "limit_squared": _table(mask.limit_squared),
         "margin": f"{flight.policy.rate_margin:g}",
     }
     return _fill("allow_rate_mask.c", values)
@@ -168,7 +168,7 @@ def _vector_values(flight, seed):
     inertia = np.asarray(flight.context.inertia, float)
     tensor = np.diag(inertia) if inertia.ndim == 1 else inertia
     rk4_steps = 1 + flight.env.frameskip
-    torque_steps = rk4_steps if flight.env.spacecraft.torque_held else 1
+    torque_steps = rk4_steps if flight.env.default_params.torque_held else 1
     return {
         "tensor": _table(tensor, _double),
         "inverse": _table(np.linalg.inv(tensor), _double),

@@ -33,21 +33,21 @@ class Layer:
 class RateMask:
     """:func:`attjax.networks.rate_mask` as constants.
 
-    With g = A ω, the square of the peak rate after action a is ω·g + gain_a, where
-    gain_a = 2 Δω_a·g + Δω_a·A Δω_a. An action is allowed if that is at most ``limit_squared``,
+    With g = A ω, the square of the peak rate after action a is at most ω·g + gain_a, where
+    gain_a = 2 Δω_a·g + own_gain_a. An action is allowed if that is at most ``limit_squared``,
     or if gain_a < 0, or if it has no torque.
 
     Attributes:
         form: (3, 3) A of :func:`attjax.rigid_body.peak_rate_form`, dimensionless.
         impulse: (actions, 3) Δω_a, change of the rate by each action, rad/s.
-        own_gain: (actions,) Δω_a·A Δω_a, rad²/s².
-        limit_squared: rad²/s².
+        own_gain: (actions,) Δω_a·A Δω_a and a bound of what is not of first order, rad²/s².
+        limit_squared: (actions,) rad²/s².
     """
 
     form: np.ndarray
     impulse: np.ndarray
     own_gain: np.ndarray
-    limit_squared: np.float32
+    limit_squared: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ class FlightPolicy:
         if self.policy.rate_margin == 0:
             return None
         constants = networks.rate_mask_constants(self.context, self.policy.rate_margin)
-        return RateMask(*(np.asarray(x, np.float32)[()] for x in constants))
+        return RateMask(*(np.asarray(x, np.float32) for x in constants))
 
 
 def decide(flight: FlightPolicy, quaternion, angular_velocity):

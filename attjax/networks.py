@@ -13,6 +13,7 @@ from flax import struct
 from attjax import checks, dynamics, rigid_body
 from attjax import observation as observations
 from attjax.context import Context
+from attjax.numerics import square_root
 
 SCALES = tuple(4.0**n for n in range(9))
 """Factors of the multi-scale inputs: 1 resolves the slew, 65,536 the last 1e-5 of it."""
@@ -179,11 +180,14 @@ FEATURES = {"state": state_features, "multiscale": multiscale_features}
 
 
 def rate_mask(observation: chex.Array, context: Context, margin: float) -> chex.Array:
-    """Which actions keep the spacecraft within ``margin`` times the rate limit for good.
+    """Which actions keep the spacecraft below the rate limit for good.
 
-    An action is allowed if the coasting motion after it never passes that rate, or if it
-    lowers the peak of a motion that does. Actions without torque are always allowed, so that
-    no state is without one. Hence no policy under the mask passes the limit from rest.
+    An action is allowed if in the motion that it leads to, its own torque and all coasting after
+    it, the rate never passes ``margin`` times the limit, as far as a forecast of first order can
+    tell, nor by an upper bound the middle between that and the limit; or if by that bound it
+    lowers the peak of a motion that does. So from rest no sequence of allowed actions passes the
+    middle (:func:`rate_mask_constants`). Actions without torque are always allowed, so that no
+    state is without one.
 
     Returns:
         (actions,) bool.
@@ -191,7 +195,7 @@ def rate_mask(observation: chex.Array, context: Context, margin: float) -> chex.
     angular_velocity = observation[observations.ANGULAR_VELOCITY]
     form, impulse, own_gain, limit_squared = rate_mask_constants(context, margin)
     gradient = jnp.matmul(form, angular_velocity, precision="highest")
-    # The peak's square after ω + Δω, less that before: a product for all actions at once.
+    # The peak's square after the action, less that before: a product for all actions at once.
     gain = 2 * jnp.matmul(impulse, gradient, precision="highest") + own_gain
     peak_squared = jnp.sum(gradient * angular_velocity) + gain
     coasts = jnp.all(context.torque_table == 0, axis=-1)
@@ -201,14 +205,26 @@ def rate_mask(observation: chex.Array, context: Context, margin: float) -> chex.
 def rate_mask_constants(context: Context, margin: float) -> tuple[chex.Array, ...]:
     """What :func:`rate_mask` needs of a spacecraft, whatever its state.
 
+    The square of the peak rate, P² = ω·Aω, is constant while the spacecraft coasts. A torque that
+    would change the rate of a body at rest by Δω in its time d changes P² by 2 Δω·Aω + Δω·AΔω, if
+    ω does not turn in the body meanwhile. As it turns by at most √½ P² a second
+    (:func:`attjax.rigid_body.peak_rate_form`) and P grows by at most p = √(Δω·AΔω), the change is
+    larger by at most √½ d p (P² + ⅔ P p + p²/6). That, for the largest P there may be, is part of
+    the own gains; the limits give it back, up to the middle between margin and limit. All this is
+    convex in the time, so no bound is passed before the torque ends.
+
     Returns:
         The (3, 3) form A of the peak rate, the (actions, 3) changes Δω of the rate, rad/s, their
-        (actions,) own gains Δω·AΔω, and the square of the rate that is kept, rad²/s².
+        (actions,) own gains, and the (actions,) squares that are allowed, rad²/s².
     """
     form = rigid_body.peak_rate_form(context.inertia)
     at_rest = jnp.zeros(3, context.inertia.dtype)
-    impulse = dynamics.rate_after_impulse(
-        at_rest, context.torque_table, context.inertia, context.torque_duration
-    )
-    own_gain = jnp.sum(jnp.matmul(impulse, form, precision="highest") * impulse, axis=-1)
-    return form, impulse, own_gain, (margin * context.rate_limit) ** 2
+    duration = context.torque_duration
+    impulse = dynamics.rate_after_impulse(at_rest, context.torque_table, context.inertia, duration)
+    squared = jnp.sum(jnp.matmul(impulse, form, precision="highest") * impulse, axis=-1)
+    growth = square_root(squared)
+    kept, highest = margin * context.rate_limit, (1 + margin) / 2 * context.rate_limit
+    turning = rigid_body.MOST_TURNING * duration * growth
+    turning = turning * (highest**2 + 2 / 3 * highest * growth + squared / 6)
+    allowed = kept**2 + jnp.minimum(turning, highest**2 - kept**2)
+    return form, impulse, squared + turning, allowed

@@ -7,6 +7,7 @@ import chex
 import jax.numpy as jnp
 
 from attjax import checks
+from attjax.numerics import square_root
 
 
 def from_axis_angle(axis: chex.Array, angle: chex.Array) -> chex.Array:
@@ -65,7 +66,7 @@ def rotation_vector(quaternion: chex.Array) -> chex.Array:
         -0.5
     """
     quaternion = checks.real("quaternion", quaternion, (4,))
-    sine = jnp.sqrt(jnp.sum(quaternion[:3] ** 2))
+    sine = square_root(jnp.sum(quaternion[:3] ** 2))
     half_angle = jnp.arctan2(sine, jnp.abs(quaternion[3]))
     tiny = jnp.finfo(quaternion.dtype).tiny
     scale = jnp.where(sine > tiny, 2 * half_angle / jnp.maximum(sine, tiny), 2.0)
@@ -76,11 +77,12 @@ def error_angle(quaternion: chex.Array) -> chex.Array:
     """Rotation angle φ ∈ [0, 2π], rad, of a (4,) quaternion of any length.
 
     φ = 2 atan2(‖q_v‖, q_s). The arc cosine of q_s would be blind below 0.04° in float32,
-    and there is no shortest-path flip: φ > π where q_s < 0, as Eq. 12 rewards q_s itself.
+    and there is no shortest-path flip: φ > π where q_s < 0, as Eq. 12 rewards q_s itself. At the
+    goal, where φ has a kink, its gradient is 0.
 
     Example:
         >>> round(jnp.rad2deg(error_angle(jnp.array([0.0, 1e-9, 0.0, 1.0]))).item(), 10)
         1.146e-07
     """
     quaternion = checks.real("quaternion", quaternion, (4,))
-    return 2 * jnp.arctan2(jnp.sqrt(jnp.sum(quaternion[:3] ** 2)), quaternion[3])
+    return 2 * jnp.arctan2(square_root(jnp.sum(quaternion[:3] ** 2)), quaternion[3])

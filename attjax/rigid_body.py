@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 
 from attjax import checks
+from attjax.numerics import square_root
 
 
 def inverse(inertia):
@@ -47,11 +48,22 @@ def peak_rate(angular_velocity, inertia):
     squares = angular_velocity * jnp.matmul(
         angular_velocity, peak_rate_form(inertia), precision="highest"
     )
-    return jnp.sqrt(jnp.sum(squares, axis=-1))
+    return square_root(jnp.sum(squares, axis=-1))
+
+
+MOST_TURNING = 0.5**0.5
+"""Of any body, ‖I⁻¹(ω × Iω)‖ ≤ √½ ‖ω‖² in the norm of :func:`peak_rate_form`."""
 
 
 def peak_rate_form(inertia):
-    """(3, 3) matrix A, dimensionless, of an inertia (3,) or (3, 3): peak rate² = ω·Aω."""
+    """(3, 3) matrix A, dimensionless, of an inertia (3,) or (3, 3): peak rate² = ω·Aω.
+
+    In the principal axes it is 1 for the least and the largest moment, and for the other, a =
+    1 + (I − I_min)(I_max − I)/(I_min I_max), between 1 and 2. So √(ω·Aω) is a norm, at least ‖ω‖.
+    In it the gyroscopic acceleration is at most MOST_TURNING of its square: with the factors
+    (Iⱼ − Iₖ)/Iᵢ ≤ 1 and a share r of the square outside the intermediate axis, its square is at
+    most a r²/4 + r (1 − r)/a ≤ ½.
+    """
     moments = principal_moments(inertia)
     low, high = jnp.min(moments), jnp.max(moments)
     tensor = jnp.diag(inertia) if inertia.ndim == 1 else inertia

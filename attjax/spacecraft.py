@@ -30,7 +30,7 @@ class EnvState:
 
 @struct.dataclass
 class EnvParams:
-    """Parameters of the spacecraft and its task; all leaves can be traced and vmapped.
+    """Parameters of the spacecraft and its task; all numbers can be traced and vmapped.
 
     Attributes:
         inertia: (3,) principal moments or (3, 3) symmetric tensor, kg m².
@@ -41,6 +41,8 @@ class EnvParams:
         max_steps_in_episode: time limit, agent steps, int32.
         frameskip: RK4 steps after the first in an agent step, int32, where spacecraft of one batch
             differ; at most the environment's. None: the environment's.
+        torque_held: whether a torque lasts through the agent step, or only its first RK4 step; a
+            Python bool, the same for all of a batch.
     """
 
     inertia: chex.Array
@@ -51,6 +53,7 @@ class EnvParams:
     max_slew_angle: chex.Array
     max_steps_in_episode: chex.Array
     frameskip: chex.Array | None = None
+    torque_held: bool = struct.field(pytree_node=False, default=False)
 
 
 def default_params(frameskip: int = 20, spacecraft: Spacecraft = LM50) -> EnvParams:
@@ -64,6 +67,7 @@ def default_params(frameskip: int = 20, spacecraft: Spacecraft = LM50) -> EnvPar
         min_slew_angle=jnp.array(low, float),
         max_slew_angle=jnp.array(high, float),
         max_steps_in_episode=jnp.array(spacecraft.max_steps(frameskip), jnp.int32),
+        torque_held=spacecraft.torque_held,
     )
 
 
@@ -83,6 +87,8 @@ def check_params(params: EnvParams, frameskip: int) -> None:
     checks.integer("max_steps_in_episode", params.max_steps_in_episode, 1, 2**31 - 1)
     if params.frameskip is not None:
         checks.integer("params.frameskip", params.frameskip, 0, frameskip)
+    if not isinstance(params.torque_held, bool):
+        raise ValueError(f"params.torque_held is {params.torque_held!r}; it must be True or False")
 
 
 def initial_state(key: chex.PRNGKey, params: EnvParams) -> EnvState:
@@ -143,17 +149,15 @@ def step(
     action,
     params: EnvParams | None = None,
     frameskip: int = 20,
-    torque_held: bool = False,
 ) -> EnvState:
     """One agent step of one spacecraft: pure, keyless, without reset or end of episode.
 
     Args:
         state: the spacecraft before the step.
         action: integer scalar, row of the torque table (Table 1).
-        params: spacecraft, the paper's by default.
+        params: spacecraft, the paper's by default; they also say whether its torques are held.
         frameskip: RK4 steps after the first (static); if ``params.frameskip`` says how many, the
             most there may be.
-        torque_held: whether the torque lasts through all of them, or only the first (static).
 
     Returns:
         The state (1 + frameskip)/240 s later.
@@ -177,6 +181,6 @@ def step(
         params.inertia,
         frameskip,
         params.frameskip,
-        torque_held,
+        params.torque_held,
     )
     return EnvState(quaternion, angular_velocity, state.time + 1)

@@ -9,6 +9,8 @@ import numpy as np
 from flax import struct
 from jax.sharding import Mesh, PartitionSpec
 
+from attjax import numerics
+
 AXIS = "devices"
 COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512}
 """For outermost jitted functions only: JAX refuses options on a function called in another."""
@@ -168,12 +170,13 @@ def _fly(env, params, key, states, actions):
     totals = Totals(jnp.zeros(batch), jnp.zeros(batch, int))
 
     def body(carry, inputs):
-        states, _, totals = carry
+        states, _, totals, excess = carry
         observations, states, reward, terminated, truncated, _ = step(
             env, params, inputs[0], states, inputs[1]
         )
         episodes = totals.episodes + (terminated | truncated)
-        return (states, observations, Totals(totals.reward + reward, episodes)), None
+        reward, excess = numerics.add((totals.reward, excess), reward)
+        return (states, observations, Totals(reward, episodes), excess), None
 
     inputs = (jax.random.split(key, len(actions)), actions)
-    return jax.lax.scan(body, (states, observations, totals), inputs)[0]
+    return jax.lax.scan(body, (states, observations, totals, jnp.zeros(batch)), inputs)[0][:3]

@@ -71,6 +71,24 @@ def test_full_inertia_gives_the_same_actions_as_its_diagonal():
             assert act(controller, quaternion, rate) == act(controller, quaternion, rate, full)
 
 
+def test_feedback_does_not_depend_on_the_axes_that_it_is_written_in(x64):
+    """The same spacecraft in turned axes: inertia, torques, attitude and rate turn along."""
+    turn = Rotation.from_rotvec([0.4, -0.7, 0.2]).as_matrix()
+    context = ENV.context(ENV.default_params)
+    turned = context.replace(
+        inertia=turn @ jnp.diag(context.inertia) @ turn.T,
+        torque_table=context.torque_table @ turn.T,
+    )
+    rng = np.random.default_rng(4)
+    for _ in range(100):
+        quaternion = rng.normal(size=4)
+        quaternion /= np.linalg.norm(quaternion)
+        rate = 0.1 * rng.normal(size=3)
+        expected = act(controllers.quaternion_feedback, quaternion, rate, context)
+        state = [*(turn @ quaternion[:3]), quaternion[3]], turn @ rate
+        assert act(controllers.quaternion_feedback, *state, turned) == expected
+
+
 @pytest.mark.parametrize(
     "name, error_deg, settling_s", [("phase-plane", 5e-4, 9.0), ("feedback", 0.02, 25.0)]
 )

@@ -8,7 +8,17 @@ from pathlib import Path
 import attjax
 
 LAYERS = [
-    {"user_functions", "specification", "template", "checks", "spaces", "kernel", "vector", "sb3"},
+    {
+        "user_functions",
+        "specification",
+        "template",
+        "checks",
+        "spaces",
+        "kernel",
+        "numerics",
+        "sb3",
+    },
+    {"vector"},
     {"settings", "programs", "context"},
     {"quaternion", "rigid_body"},
     {"dynamics"},

@@ -47,18 +47,23 @@ def test_multiscale_features_make_the_last_stretch_the_same_at_every_rate():
     np.testing.assert_allclose(slow[:-2], fast[:-2], rtol=1e-6)
 
 
-def test_mask_removes_exactly_the_actions_that_lead_beyond_the_limit(x64):
+@pytest.mark.parametrize("duration", [1 / 240, 0.1], ids=["pulse", "held"])
+def test_mask_removes_exactly_the_actions_that_lead_beyond_the_limit(x64, duration):
+    """0.45 rad/s by a forecast of first order, 0.475 by an upper bound."""
     rng = np.random.default_rng(0)
-    context = ENV.context(ENV.default_params)
-    table, inertia = np.asarray(context.torque_table), np.asarray(context.inertia)
-    middle = 0.797 * (0.872 + 0.115 - 0.797) / (0.872 * 0.115)
+    context = ENV.context(ENV.default_params).replace(torque_duration=duration)
+    change = np.asarray(context.torque_table) / np.asarray(context.inertia) * duration
+    form = [1, 1, 0.797 * (0.872 + 0.115 - 0.797) / (0.872 * 0.115)]
+    growth = np.sqrt(change**2 @ form)
+    turning = 0.5**0.5 * duration * growth
+    turning = turning * (0.475**2 + 2 / 3 * 0.475 * growth + growth**2 / 6)
     limited = 0
     for _ in range(200):
         w = rng.normal(size=3)
         w *= rng.uniform(0.40, 0.52) / np.linalg.norm(w)
-        before = np.sqrt(w**2 @ [1, 1, middle])
-        after = np.sqrt((w + table / inertia / 240) ** 2 @ [1, 1, middle])
-        expected = (after <= 0.45) | (after < before) | (np.arange(19) == 0)
+        before, after = w**2 @ form, (w + change) ** 2 @ form
+        expected = (after <= 0.45**2) & (after + turning <= 0.475**2)
+        expected |= (after + turning < before) | (np.arange(19) == 0)
         ours = networks.rate_mask(observe(w), context, 0.9)
         np.testing.assert_array_equal(ours, expected)
         limited += not expected.all()

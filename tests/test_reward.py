@@ -5,7 +5,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax.reward import Transition, logarithmic_reward, paper_reward, scalar_part_increased
+from attjax import AttitudeEnv, EnvState
+from attjax import quaternion as quaternions
+from attjax.reward import (
+    REWARDS,
+    Transition,
+    logarithmic_reward,
+    paper_reward,
+    scalar_part_increased,
+)
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -114,3 +122,21 @@ def test_logarithmic_reward(period, truncated):
 
 def test_logarithmic_reward_punishes_overspeed():
     assert logarithmic_reward(transition(quaternion(1), quaternion(1), terminated=True)) == -50
+
+
+@pytest.mark.parametrize("reward", REWARDS.values(), ids=REWARDS)
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["goal", "antipode"])
+def test_gradients_at_rest_at_the_goal_are_finite(reward, sign):
+    """Of the error angle, of the reward, and through an agent step of any action."""
+    env = AttitudeEnv(5, reward)
+
+    def rewarded(quaternion, angular_velocity):
+        state = EnvState(quaternion, angular_velocity, jnp.array(0))
+        return env.step_env(None, state, 0, env.default_params)[2]
+
+    goal, rest = jnp.array([0.0, 0, 0, sign]), jnp.zeros(3)
+    assert jax.grad(quaternions.error_angle)(goal).tolist() == [0, 0, 0, 0]
+    for gradient in jax.grad(rewarded, (0, 1))(goal, rest):
+        assert np.all(np.isfinite(gradient))
+    near = goal.at[0].set(1e-6)
+    assert abs(float(jax.grad(quaternions.error_angle)(near)[0])) == pytest.approx(2, rel=1e-5)

@@ -80,6 +80,19 @@ def test_a_held_torque_turns_a_cubesat_by_its_closed_form(x64):
     np.testing.assert_allclose(start.quaternion[0], np.sin(rate / 4), rtol=1e-9)
 
 
+def test_the_users_step_holds_the_torque_that_the_environment_holds(x64):
+    env = AttitudeEnv(frameskip=23, spacecraft=CUBESAT)
+    state = env.reset(jax.random.key(0), env.default_params)[1]
+    expected = env.step_env(None, state, 3, env.default_params)[1]
+    alone = attjax.step(state, 3, env.default_params, 23)
+    jax.tree.map(np.testing.assert_array_equal, alone, expected)
+    assert alone.angular_velocity[1] == pytest.approx(2e-3 * 0.1 / 0.144, rel=1e-6)
+    pulsed = env.default_params.replace(torque_held=False)
+    assert env.context(pulsed).torque_duration == 1 / 240
+    after = env.step_env(None, state, 3, pulsed)[1]
+    assert after.angular_velocity[1] == pytest.approx(2e-3 / 240 / 0.144, rel=1e-6)
+
+
 @pytest.mark.parametrize("controller", controllers.CONTROLLERS)
 def test_classical_controllers_fly_a_cubesat_with_wheels(controller):
     env = AttitudeEnv(frameskip=23, spacecraft=CUBESAT)

@@ -1,12 +1,14 @@
 /* With g = Aw, w.g is the square of the largest rate of the coasting motion. */
 static const float peak_rate_form[3][3] = $form;
 
-/* Change of the angular velocity by each action, rad/s, and u.Au of that change u. */
+/*
+ * Change of the angular velocity by each action, rad/s; for that change u, u.Au and the most that
+ * the body's turning adds while the torque acts; and the square of the rate that it may lead to,
+ * from $margin times the rate limit to the middle between that and the limit, rad^2/s^2.
+ */
 static const float impulse[ATTJAX_ACTIONS][3] = $impulse;
 static const float own_gain[ATTJAX_ACTIONS] = $own_gain;
-
-/* The square of $margin times the rate limit, rad^2/s^2. */
-static const float limit_squared = $limit_squared;
+static const float limit_squared[ATTJAX_ACTIONS] = $limit_squared;
 
 /*
  * Which actions keep the rate within the limit for good: those after which the coasting motion
@@ -25,7 +27,7 @@ static void allow(const float w[3], int allowed[ATTJAX_ACTIONS])
     for (int a = 0; a < ATTJAX_ACTIONS; a++) {
         const float *u = impulse[a];
         const float gain = 2.0f * (u[0] * g[0] + u[1] * g[1] + u[2] * g[2]) + own_gain[a];
-        allowed[a] = peak_squared + gain <= limit_squared || gain < 0.0f;
+        allowed[a] = peak_squared + gain <= limit_squared[a] || gain < 0.0f;
     }
     allowed[ATTJAX_NO_TORQUE] = 1;
 }
