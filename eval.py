@@ -185,7 +185,10 @@ def _spacecraft(arguments, names):
     else:
         spacecraft = LM50
     if arguments.duration is not None:
-        spacecraft = dataclasses.replace(spacecraft, duration=arguments.duration)
+        try:
+            spacecraft = dataclasses.replace(spacecraft, duration=arguments.duration)
+        except ValueError as error:
+            raise cli.UserError(f"--duration {arguments.duration:g}: {error}") from None
     _check_duration(spacecraft.duration, arguments.frameskip)
     return spacecraft
 

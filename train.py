@@ -135,7 +135,10 @@ def _setup(config):
     from attjax import assembly
 
     num_devices = assembly.num_devices(config.settings)
-    return assembly.setup(config.settings, config.spacecraft, num_devices)
+    try:
+        return assembly.setup(config.settings, config.spacecraft, num_devices)
+    except ValueError as error:
+        raise cli.UserError(error) from None
 
 
 def _resumed_config(given, config):

@@ -7,9 +7,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import learner, spacecraft, user_functions
+from attjax import learner, observation, spacecraft, user_functions
 from attjax.env import AttitudeEnv
-from attjax.networks import FEATURES, Policy
+from attjax.networks import FEATURES, Policy, rate_mask
 from attjax.reward import REWARDS
 from attjax.settings import Settings
 from attjax.specification import LM50, Spacecraft
@@ -40,6 +40,7 @@ def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) ->
 
     Raises:
         FunctionError: the reward or the features are a user's function that cannot be used.
+        ValueError: the rate mask leaves no torque, even at rest.
     """
     reward = REWARDS.get(settings.reward) or user_functions.resolve(settings.reward)
     start = spacecraft.initial_state
@@ -51,8 +52,23 @@ def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) ->
         user_functions.check(
             f"reward {settings.reward}", lambda: jax.eval_shape(first_reward), rank=0
         )
+    if settings.rate_margin > 0:
+        _check_that_torques_are_left(settings, craft)
     groups = len(settings.frameskips)
     return learner.Setup(env, policy(settings, craft), settings, groups, num_devices)
+
+
+def _check_that_torques_are_left(settings, craft):
+    for frameskip in settings.frameskips:
+        env = AttitudeEnv(frameskip, spacecraft=craft)
+        at_rest = jnp.zeros(observation.SIZE)
+        context = env.context(env.default_params)
+        if np.sum(rate_mask(at_rest, context, settings.rate_margin)) <= 1:
+            raise ValueError(
+                f"rate_margin {settings.rate_margin:g} masks every torque of {craft} with frameskip "
+                f"{frameskip}, even at rest: weaker torque_levels, a smaller frameskip or a larger "
+                f"rate_limit, or rate_margin 0, which masks nothing"
+            )
 
 
 def _first_reward(env):

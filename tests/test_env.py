@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, EnvState, observation
+from attjax import AttitudeEnv, EnvState, Spacecraft, observation
 from attjax.reward import logarithmic_reward
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
@@ -221,3 +221,16 @@ def test_float32_takes_the_same_reward_branches_as_float64():
     assert (
         min((double > 9).mean(), (double < 0).mean(), ((double > 0) & (double < 1)).mean()) > 0.02
     )
+
+
+def test_observation_space_holds_the_kick_of_an_oblique_torque():
+    """A sphere half a turn away spins about (1, 1, 1), at the limit, and is pushed on."""
+    sphere = Spacecraft(
+        inertia=(1, 1, 1), torque_levels=(2.3,), torque_axes=((1, 1, 1),), rate_limit=0.01
+    )
+    env = AttitudeEnv(0, spacecraft=sphere)
+    axis = jnp.ones(3) / 3**0.5
+    state = EnvState(jnp.append(axis, 0), 0.00999 * axis, jnp.array(3))
+    observation = env.step_env(None, state, 1, env.default_params)[0]
+    assert env.observation_space(env.default_params).contains(observation)
+    assert abs(observation[7]) > 0.0097  # q_s: half the rate, all of it about the one axis

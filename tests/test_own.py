@@ -115,6 +115,26 @@ def test_bad_spacecraft_files(tmp_path, capsys, text, expected):
     assert not (tmp_path / "ckpt").exists()
 
 
+def test_a_mask_that_leaves_no_torque_is_refused(tmp_path, capsys):
+    path = tmp_path / "strong.toml"
+    path.write_text("inertia = [0.05, 0.14, 0.17]\ntorque_levels = [2.0, 1.0]\ntorque_held = true\n")
+    flags = [*TINY, "--preset", "precise", "--spacecraft", str(path), "--frameskips", "23"]
+    message = one_line_error(
+        train_script.main, [*flags, "--checkpoint", str(tmp_path / "run")], capsys
+    )
+    assert "rate_margin 0.99 masks every torque of strong with frameskip 23" in message
+    assert not list((tmp_path / "run").iterdir())
+
+
+def test_a_tensor_that_single_precision_cannot_follow_is_refused(tmp_path, capsys):
+    path = tmp_path / "needle.toml"
+    tensor = "inertia = [[1.0, 0.1, 0], [0.1, 1.0, 0], [0, 0, 0.2]]"
+    path.write_text(f"{tensor}\ntorque_levels = [1e-3]\nrate_limit = 5.0\n")
+    arguments = ["--controller", "phase-plane", "--spacecraft", str(path), "--device", "cpu"]
+    message = one_line_error(eval_script.main, [*arguments, "--duration", "9000"], capsys)
+    assert "--duration 9000" in message and "at most 7273 s at a rate_limit of 5" in message
+
+
 def test_settings_that_do_not_fit_the_spacecraft(tmp_path, capsys):
     path = tmp_path / "craft.toml"
     path.write_text("inertia = [1, 1, 1]\ntorque_levels = [1]\nduration = 0.05\n")
