@@ -1,7 +1,10 @@
 /* With g = Aw, w.g is the square of the largest rate of the coasting motion. */
 static const float peak_rate_form[3][3] = $form;
 
-/* Change of the angular velocity by each action, rad/s, and u.Au of that change u. */
+/*
+ * Change of the angular velocity by each action, rad/s, and how much of the change of that square
+ * is the same whatever the state, rad^2/s^2.
+ */
 static const float impulse[ATTJAX_ACTIONS][3] = $impulse;
 static const float own_gain[ATTJAX_ACTIONS] = $own_gain;
 
