@@ -49,7 +49,7 @@ def decisions(flight: FlightPolicy, quaternion, angular_velocity) -> Decisions:
     ]
     masked = logits == networks.MASKED_LOGIT
     same_mask = [np.all((x == networks.MASKED_LOGIT) == masked, axis=1) for x in nearby]
-    clear = _not_tied(np.where(masked, np.nan, logits)) & same_mask[0] & same_mask[1]
+    clear = _not_tied(logits, masked) & same_mask[0] & same_mask[1]
     return Decisions(quaternion, angular_velocity, action, logits, clear)
 
 
@@ -58,11 +58,12 @@ def _decide_all(flight, quaternion, angular_velocity):
     return jax.vmap(functools.partial(flight_policy.decide, flight))(quaternion, angular_velocity)
 
 
-def _not_tied(logits):
-    """Whether the best logit leads the second by TIE of their range; NaN where masked."""
-    span = np.nanmax(logits, axis=1) - np.nanmin(logits, axis=1)
-    second, best = np.sort(np.nan_to_num(logits, nan=-np.inf), axis=1)[:, -2:].T
-    return best - second > TIE * span
+def _not_tied(logits, masked):
+    """Whether the best logit leads the second by TIE of their range; not if one is NaN."""
+    second, best = np.sort(np.where(masked, -np.inf, logits), axis=1)[:, -2:].T
+    least = np.min(np.where(masked, np.inf, logits), axis=1)
+    with np.errstate(invalid="ignore"):
+        return best - second > TIE * (best - least)
 
 
 def flown_decisions(flight: FlightPolicy, seed: int, slews: int, states_per_slew: int) -> Decisions:
