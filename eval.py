@@ -15,7 +15,7 @@ CLASSICAL = ("phase-plane", "feedback")
 USAGE = "eval.py [--checkpoint FOLDER | --controller NAME] [--compare] [FLAG ...]"
 EXAMPLES = """\
 examples:
-  python eval.py --checkpoint ckpt/                 5,000 slews, at 40 Hz if that was trained
+  python eval.py --checkpoint ckpt/                 5,000 random slews
   python eval.py --checkpoint ckpt/ --frameskip 20  the same at 11.43 Hz
   python eval.py --checkpoint ckpt/ --compare       beside the classical ones
   python eval.py --checkpoint ckpt/ --json result.json --plot figures/
