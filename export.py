@@ -33,7 +33,7 @@ def _add_what(group):
 
 
 def _add_output(group):
-    format_help = "c: C99, with a test program; onnx and stablehlo need the extra onnx"
+    format_help = "c: C99 and C++, with a test program; onnx and stablehlo need the extra onnx"
     group.add_argument("--format", choices=FORMATS, required=True, help=format_help)
     out_help = "folder to write into"
     group.add_argument("--out", type=Path, metavar="FOLDER", required=True, help=out_help)
