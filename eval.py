@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from attjax import cli, config_file, help_text, run_folder, settings
+from attjax import cli, config_file, help_text, run_folder
 from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
 
 POLICY = "policy"
@@ -15,7 +15,7 @@ CLASSICAL = ("phase-plane", "feedback")
 USAGE = "eval.py [--checkpoint FOLDER | --controller NAME] [--compare] [FLAG ...]"
 EXAMPLES = """\
 examples:
-  python eval.py --checkpoint ckpt/                 5,000 slews at 40 Hz
+  python eval.py --checkpoint ckpt/                 5,000 random slews
   python eval.py --checkpoint ckpt/ --frameskip 20  the same at 11.43 Hz
   python eval.py --checkpoint ckpt/ --compare       beside the classical ones
   python eval.py --checkpoint ckpt/ --json result.json --plot figures/
@@ -46,8 +46,9 @@ def _add_who(group):
 
 def _add_conditions(group):
     cli.add_number(group, "episodes", int, 5000, "number of random slews", low=1, high=10**7)
-    frameskip_help = "RK4 steps of 1/240 s after the first of a decision, for 240/(N + 1) Hz"
-    cli.add_number(group, "frameskip", int, 5, frameskip_help, **settings.FRAMESKIP)
+    cli.add_frameskip(
+        group, "RK4 steps of 1/240 s after the first of a decision, for 240/(N + 1) Hz"
+    )
     craft_help = (
         "TOML file of the spacecraft that flies (default: the one that the policy was trained on; "
         "LM50 for a classical controller)"
@@ -78,6 +79,7 @@ def main(argv=None) -> int:
     with cli.one_line_errors("eval.py", run_folder.FolderError), cli.enough_memory(advice):
         cli.select_device(arguments.device)
         names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
+        arguments.frameskip = _frameskip(arguments, names)
         spacecraft = _spacecraft(arguments, names)
         controllers = {name: _controller(name, arguments, spacecraft) for name in names}
         _check_writable("--json", arguments.json)
@@ -173,6 +175,14 @@ def _write_playback(arguments, controllers, env, params):
     with run_folder.writing(arguments.playback):
         run_folder.replace(arguments.playback, page)
     print(f"wrote {arguments.playback}")
+
+
+def _frameskip(arguments, names):
+    """The control rate, by default one that the policy was trained at."""
+    trained = None
+    if POLICY in names:
+        trained = run_folder.read_config(arguments.checkpoint).settings.frameskips
+    return cli.frameskip("eval.py", arguments.frameskip, trained)
 
 
 def _spacecraft(arguments, names):

@@ -1,10 +1,12 @@
 """Write a trained attitude controller for flight software: C99, ONNX or StableHLO."""
 
+import argparse
+import contextlib
 import importlib
 import sys
 from pathlib import Path
 
-from attjax import cli, help_text, run_folder, settings
+from attjax import c_names, cli, help_text, run_folder
 
 FORMATS = {"c": "export_c", "onnx": "export_onnx", "stablehlo": "export_stablehlo"}
 NEEDED = {"export_onnx": "onnx", "export_stablehlo": "flatbuffers"}
@@ -26,18 +28,31 @@ def parse_arguments(argv):
 def _add_what(group):
     cli.add_checkpoint(group)
     cli.add_best(group)
-    frameskip_help = "control rate of the flight software, 240/(N + 1) Hz"
-    cli.add_number(group, "frameskip", int, 5, frameskip_help, **settings.FRAMESKIP)
+    cli.add_frameskip(group, "control rate of the flight software, 240/(N + 1) Hz")
     cli.add_seed_and_device(group, "seed of the slews that test vectors come from")
 
 
 def _add_output(group):
-    format_help = "c: C99, with a test program; onnx and stablehlo need the extra onnx"
+    format_help = "c: C99 and C++, with a test program; onnx and stablehlo need the extra onnx"
     group.add_argument("--format", choices=FORMATS, required=True, help=format_help)
     out_help = "folder to write into"
     group.add_argument("--out", type=Path, metavar="FOLDER", required=True, help=out_help)
+    prefix_help = (
+        "what the names of the files begin with, and in C those of functions and macros: for two "
+        f"rates in one program (default: {c_names.PREFIX})"
+    )
+    group.add_argument(
+        "--prefix", type=_prefix, metavar="NAME", default=c_names.PREFIX, help=prefix_help
+    )
     overwrite_help = "replace files that an export wrote before"
     group.add_argument("--overwrite", action="store_true", help=overwrite_help)
+
+
+def _prefix(text):
+    try:
+        return c_names.check(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def main(argv=None) -> int:
@@ -48,8 +63,10 @@ def main(argv=None) -> int:
         cli.select_device(arguments.device)
         module = _module(FORMATS[arguments.format])
         flight = _flight_policy(arguments)
-        _prepare(arguments.out, module.FILES, arguments.overwrite)
-        contents = module.files(flight, arguments.seed or 0)
+        names = [c_names.renamed(name, arguments.prefix) for name in module.FILES]
+        _prepare(arguments.out, names, arguments.overwrite)
+        with _exporting(arguments.checkpoint):
+            contents = module.files(flight, arguments.seed or 0, arguments.prefix)
         with run_folder.writing(arguments.out):
             for name, content in contents.items():
                 run_folder.replace(arguments.out / name, content)
@@ -69,22 +86,29 @@ def _module(name):
 
 def _flight_policy(arguments):
     # Imported late: with them, --help and errors in the arguments would take seconds.
-    from attjax import AttitudeEnv, checkpoint
+    from attjax import AttitudeEnv, checkpoint, provenance
     from attjax.flight_policy import FlightPolicy
 
     folder = arguments.checkpoint
     config = run_folder.read_config(folder)
-    update = checkpoint.best(folder) if arguments.best else checkpoint.latest(folder)
+    newest = checkpoint.latest(folder)
+    update = checkpoint.best(folder) if arguments.best else newest
     policy, params = checkpoint.restore_network(folder, update)
     if callable(policy.features) and arguments.format != "stablehlo":
         raise cli.UserError(
             f"the policy in {folder} sees {config.settings.features}, which --format "
             f"{arguments.format} does not know; stablehlo does"
         )
-    origin = f"preset {config.preset}, seed {config.seed}, update {update}"
+    frameskip = cli.frameskip("export.py", arguments.frameskip, config.settings.frameskips)
+    with _exporting(folder):
+        env = AttitudeEnv(frameskip, spacecraft=config.spacecraft)
+        return FlightPolicy(policy, params, env, provenance.of_run(config, update, newest))
+
+
+@contextlib.contextmanager
+def _exporting(folder):
     try:
-        env = AttitudeEnv(arguments.frameskip, spacecraft=config.spacecraft)
-        return FlightPolicy(policy, params, env, origin)
+        yield
     except ValueError as error:
         raise cli.UserError(f"{folder} cannot be exported: {error}") from None
 

@@ -13,6 +13,8 @@ from attjax import help_text, settings, user_functions
 
 DEVICES = ("auto", "cpu", "gpu")
 BAD_INPUT = 2
+TABLE_2 = 5
+"""Frameskip of the paper's Table 2, 40 Hz."""
 
 
 class UserError(Exception):
@@ -100,6 +102,36 @@ def add_seed_and_device(group, seed_help: str) -> None:
     add_number(group, "seed", int, None, f"{seed_help} (default: 0)", **settings.SEED)
     device_help = "where to compute (default: auto, a GPU if JAX finds one)"
     group.add_argument("--device", choices=DEVICES, default="auto", help=device_help)
+
+
+def add_frameskip(group, meaning: str) -> None:
+    """Add --frameskip, None where it is not given: :func:`frameskip` then chooses."""
+    default = f"{TABLE_2} as in Table 2 if that was trained, else the trained one nearest to it"
+    help = f"{meaning} (default: {default})"
+    add_number(group, "frameskip", int, None, help, **settings.FRAMESKIP)
+
+
+def frameskip(prog: str, given: int | None, trained: tuple[int, ...] | None) -> int:
+    """The frameskip that was asked for, or else one that suits the controller.
+
+    Args:
+        prog: the program, which warns of one that was not trained.
+        given: what the user asked for, if anything.
+        trained: those that the policy was trained at; None of a controller without training.
+
+    Example:
+        >>> frameskip("eval.py", None, (7, 3, 20))  # the quicker of two as near
+        3
+    """
+    if given is None:
+        return min(trained or [TABLE_2], key=lambda k: (abs(k - TABLE_2), k))
+    if trained and given not in trained:
+        rates = ", ".join(map(str, sorted(set(trained))))
+        print(
+            f"{prog}: warning: frameskip {given} was not trained; the run trained {rates}",
+            file=sys.stderr,
+        )
+    return given
 
 
 def add_number(group, name: str, kind: type, default, help: str, **details) -> None:

@@ -1,9 +1,10 @@
 """A policy as C99 for flight software: a header and a source, and a test program beside them."""
 
+from string import Template
+
 import numpy as np
 
-import attjax
-from attjax import flight_policy, networks, template
+from attjax import c_names, c_text, flight_check, networks, template
 from attjax.flight_policy import FlightPolicy
 
 POLICY_FILES = ("attjax_policy.h", "attjax_policy.c")
@@ -11,24 +12,38 @@ TEST_FILES = ("attjax_vectors.h", "attjax_test.c")
 FILES = POLICY_FILES + TEST_FILES
 VECTORS = 500
 VECTOR_SLEWS = 25
-NUMBERS_A_LINE = 8
+INDENT = " " * 15
+"""Of the lines after the first that tell a fact."""
 
 
-def files(flight: FlightPolicy, seed: int) -> dict[str, str]:
-    """The text of each of FILES; ``seed`` draws the slews that the test vectors come from."""
-    return policy_files(flight) | test_files(flight, seed)
+def files(flight: FlightPolicy, seed: int, prefix: str = c_names.PREFIX) -> dict[str, str]:
+    """The text of each of FILES, by its name with the prefix.
+
+    Args:
+        flight: the policy.
+        seed: draws the slews that the test vectors come from.
+        prefix: of all names: files, symbols, macros.
+
+    Raises:
+        ValueError: the prefix is none, or the policy decides nothing clearly.
+    """
+    return policy_files(flight, prefix) | test_files(flight, seed, prefix)
 
 
-def policy_files(flight: FlightPolicy) -> dict[str, str]:
+def policy_files(flight: FlightPolicy, prefix: str = c_names.PREFIX) -> dict[str, str]:
     """The header and the source."""
-    values = _header_values(flight) | _source_values(flight)
-    return {name: _fill(name, values) for name in POLICY_FILES}
+    values = _header_values(flight) | _source_values(flight, prefix)
+    return _filled(POLICY_FILES, prefix, _own_facts(flight) | values)
 
 
-def test_files(flight: FlightPolicy, seed: int) -> dict[str, str]:
+def test_files(flight: FlightPolicy, seed: int, prefix: str = c_names.PREFIX) -> dict[str, str]:
     """The test program, and the test vectors that it includes."""
-    values = _vector_values(flight, seed)
-    return {name: _fill(name, values) for name in TEST_FILES}
+    return _filled(TEST_FILES, prefix, _own_facts(flight) | _vector_values(flight, seed))
+
+
+def _filled(names, prefix, values):
+    c_names.check(prefix)
+    return {c_names.renamed(name, prefix): _fill(name, prefix, values) for name in names}
 
 
 def constant_bytes(flight: FlightPolicy) -> int:
@@ -70,70 +85,80 @@ def operations(flight: FlightPolicy) -> dict[str, int]:
     }
 
 
-def _fill(name, values):
-    """A template with these values, and the version that all of them may name."""
-    return template.fill(name, version=attjax.__version__, **values)
+def _own_facts(flight):
+    """What a file says of itself in its first comment."""
+    lines = [f" *   {k + ':':<13}{c_text.comment(v, INDENT)}" for k, v in flight.facts.items()]
+    return {"facts": "\n".join(lines)}
 
 
 def _header_values(flight):
     context = flight.context
     return operations(flight) | {
-        "origin": _comment(flight.origin),
         "actions": len(flight.torque_table),
-        "spacecraft": _comment(flight.env.spacecraft.name),
-        "inertia": _inertia(flight.env.spacecraft.inertia),
+        "inertia": c_text.comment(_inertia(flight.env.spacecraft.inertia), INDENT),
+        "kept_rate": c_text.comment(_kept_rate(flight), INDENT),
         "constant_bytes": constant_bytes(flight),
         "stack_bytes": stack_bytes(flight),
         "no_torque": flight.no_torque,
-        "control_period": _number(flight.env.control_period),
-        "pulse": _number(context.torque_duration),
-        "rate_limit": _number(context.rate_limit),
+        "control_period": c_text.number(flight.env.control_period),
+        "pulse": c_text.number(context.torque_duration),
+        "rate_limit": c_text.number(context.rate_limit),
     }
 
 
-def _source_values(flight):
+def _kept_rate(flight):
+    margin = flight.policy.rate_margin
+    if margin == 0:
+        return "there is no mask; nothing keeps it but what was learned"
+    return (
+        f"actions after which the coasting motion would pass {margin} of it are masked, except "
+        f"those that lower that motion's largest rate"
+    )
+
+
+def _source_values(flight, prefix):
     return {
         "features": flight.layers[0].weights.shape[0],
-        "torque_table": _table(flight.torque_table),
+        "torque_table": c_text.table(flight.torque_table),
         "weights": "\n".join(_weights(n, x) for n, x in enumerate(flight.layers, 1)),
-        "features_function": _features_function(flight),
+        "features_function": _features_function(flight, prefix),
         "forward": _forward(flight.layers),
-        "allow_function": _allow_function(flight),
+        "allow_function": _allow_function(flight, prefix),
     }
 
 
-def _features_function(flight):
+def _features_function(flight, prefix):
     if flight.policy.features == "state":
-        return _fill("features_state.c", {})
+        return _fill("features_state.c", prefix, {})
     period, ten = flight.control_period, np.float32(10)
     values = {
         "scales": len(networks.SCALES),
-        "scale_values": _table(np.array(networks.SCALES)),
+        "scale_values": c_text.table(np.array(networks.SCALES)),
         "feature_period": networks.FEATURE_PERIOD,
-        "attitude_factor": _number(np.float32(networks.FEATURE_PERIOD) / period),
-        "tenfold_period": _number(ten * period),
-        "log_tenfold_period": _number(np.log(ten * period)),
+        "attitude_factor": c_text.number(np.float32(networks.FEATURE_PERIOD) / period),
+        "tenfold_period": c_text.number(ten * period),
+        "log_tenfold_period": c_text.number(np.log(ten * period)),
     }
-    return _fill("features_multiscale.c", values)
+    return _fill("features_multiscale.c", prefix, values)
 
 
-def _allow_function(flight):
+def _allow_function(flight, prefix):
     mask = flight.rate_mask
     if mask is None:
-        return _fill("allow_all.c", {})
+        return _fill("allow_all.c", prefix, {})
     values = {
-        "form": _table(mask.form),
-        "impulse": _table(mask.impulse),
-        "own_gain": _table(mask.own_gain),
-        "limit_squared": _table(mask.limit_squared),
-        "margin": f"{flight.policy.rate_margin:g}",
+        "form": c_text.table(mask.form),
+        "impulse": c_text.table(mask.impulse),
+        "own_gain": c_text.table(mask.own_gain),
+        "limit_squared": c_text.table(mask.limit_squared),
+        "margin": flight.policy.rate_margin,
     }
-    return _fill("allow_rate_mask.c", values)
+    return _fill("allow_rate_mask.c", prefix, values)
 
 
 def _weights(number, layer):
     inputs, outputs = layer.weights.shape
-    weights, biases = _table(layer.weights.ravel()), _table(layer.biases)
+    weights, biases = c_text.table(layer.weights.ravel()), c_text.table(layer.biases)
     return (
         f"static const float weights_{number}[{inputs} * {outputs}] = {weights};\n"
         f"static const float biases_{number}[{outputs}] = {biases};\n"
@@ -157,29 +182,29 @@ def _forward(layers):
 
 
 def _vector_values(flight, seed):
-    flown = flight_policy.flown_decisions(flight, seed, VECTOR_SLEWS, 4 * VECTORS // VECTOR_SLEWS)
+    flown = flight_check.flown_decisions(flight, seed, VECTOR_SLEWS, 4 * VECTORS // VECTOR_SLEWS)
     clear = np.flatnonzero(flown.clear)
+    if not len(clear):
+        raise ValueError("all its decisions hang on rounding")
     chosen = clear[np.linspace(0, len(clear) - 1, min(VECTORS, len(clear))).astype(int)]
-    rows = [
-        f"{{{_row(flown.quaternion[i])}, {_row(flown.angular_velocity[i])}, {flown.action[i]}}}"
-        for i in chosen
-    ]
-    slews = flight_policy.fly_table_5(flight)
+    states = [map(c_text.row, (flown.quaternion[i], flown.angular_velocity[i])) for i in chosen]
+    rows = [f"{{{', '.join(x)}, {flown.action[i]}}}" for i, x in zip(chosen, states)]
+    slews = flight_check.fly_table_5(flight)
     inertia = np.asarray(flight.context.inertia, float)
     tensor = np.diag(inertia) if inertia.ndim == 1 else inertia
     rk4_steps = 1 + flight.env.frameskip
     torque_steps = rk4_steps if flight.env.default_params.torque_held else 1
     return {
-        "tensor": _table(tensor, _double),
-        "inverse": _table(np.linalg.inv(tensor), _double),
+        "tensor": c_text.table(tensor, c_text.double),
+        "inverse": c_text.table(np.linalg.inv(tensor), c_text.double),
         "torque_steps": torque_steps,
         "coasting_steps": rk4_steps - torque_steps,
-        "goal_deg": _double(flight.env.spacecraft.goal_angle_deg),
+        "goal_deg": c_text.double(flight.env.spacecraft.goal_angle_deg),
         "decisions": int(flight.env.default_params.max_steps_in_episode),
         "slews": len(slews.rate),
-        "slew_start": _table(slews.quaternion, _double),
-        "slew_error_deg": _row(slews.error_deg, _double),
-        "slew_rate": _row(slews.rate, _double),
+        "slew_start": c_text.table(slews.quaternion, c_text.double),
+        "slew_error_deg": c_text.row(slews.error_deg, c_text.double),
+        "slew_rate": c_text.row(slews.rate, c_text.double),
         "vectors": len(chosen),
         "vector_values": "{\n    " + ",\n    ".join(rows) + "}",
     }
@@ -187,36 +212,16 @@ def _vector_values(flight, seed):
 
 def _inertia(values):
     if isinstance(values[0], tuple):
-        rows = "; ".join(" ".join(f"{x:g}" for x in row) for row in values)
-        return f"inertia tensor\n * ({rows})"
-    return f"moments of inertia\n * ({', '.join(f'{x:g}' for x in values)})"
+        tensor = "; ".join(map(_numbers, values))
+        return f"tensor ({tensor}) kg m^2, in the axes of the body frame"
+    return f"moments ({_numbers(values)}) kg m^2, about the axes of the body frame"
 
 
-def _comment(text):
-    """Text that may stand in a C comment."""
-    return text.encode("ascii", "replace").decode().replace("*/", "* /").replace("??/", "?? /")
+def _numbers(values):
+    return ", ".join(repr(float(x)) for x in values)
 
 
-def _table(values, number=None):
-    """A C initialiser of a vector, some numbers a line, or of a matrix, a row a line."""
-    values = np.asarray(values)
-    if values.ndim == 1:
-        cuts = range(NUMBERS_A_LINE, values.size, NUMBERS_A_LINE)
-        rows = [_row(part, number)[1:-1] for part in np.split(values, cuts)]
-    else:
-        rows = [_row(part, number) for part in values]
-    return "{\n    " + ",\n    ".join(rows) + "}"
-
-
-def _row(values, number=None):
-    return "{" + ", ".join(map(number or _number, np.asarray(values))) + "}"
-
-
-def _number(x):
-    """A C constant that is exactly this float32."""
-    return str(np.float32(x) + np.float32(0)) + "f"  # + 0: no -0.0
-
-
-def _double(x):
-    """A C constant that is exactly this number."""
-    return repr(float(x))
+def _fill(name, prefix, values):
+    """A template with these values; the template's own names, no user's, get the prefix."""
+    text = c_names.renamed(template.read(name), prefix)
+    return Template(text).substitute(values)

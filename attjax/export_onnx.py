@@ -2,7 +2,8 @@
 
 Inputs, float32: ``quaternion`` (batch, 4), unit error quaternions, scalar last, and
 ``angular_velocity`` (batch, 3), body frame, rad/s. Outputs: ``action`` (batch,), int64, and
-``logits`` (batch, actions), -1e9 where masked.
+``logits`` (batch, actions), -1e9 where masked. Numbers that are not finite are not looked for.
+Where the policy comes from and what it was trained for is in the model's metadata.
 """
 
 import numpy as np
@@ -10,7 +11,7 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 import attjax
-from attjax import networks
+from attjax import c_names, networks
 from attjax.flight_policy import FlightPolicy
 
 FILES = ("attjax_policy.onnx",)
@@ -38,10 +39,11 @@ class Graph:
         return output
 
 
-def files(flight: FlightPolicy, seed: int = 0) -> dict[str, bytes]:
-    """The content of each of FILES; there are no test vectors for a seed to draw."""
+def files(flight: FlightPolicy, seed: int = 0, prefix: str = c_names.PREFIX) -> dict[str, bytes]:
+    """The content of each of FILES, by its name with the prefix; no test vectors need a seed."""
     del seed
-    return {FILES[0]: model(flight).SerializeToString(deterministic=True)}
+    name = c_names.renamed(FILES[0], c_names.check(prefix))
+    return {name: model(flight).SerializeToString(deterministic=True)}
 
 
 def model(flight: FlightPolicy) -> onnx.ModelProto:
@@ -62,13 +64,14 @@ def model(flight: FlightPolicy) -> onnx.ModelProto:
             inputs,
             [action, _tensor("logits", actions)],
             graph.constants,
-            doc_string=f"{flight.origin}; control period {flight.control_period:g} s",
         ),
         opset_imports=[helper.make_opsetid("", OPSET)],
         ir_version=IR_VERSION,
         producer_name="attjax",
         producer_version=attjax.__version__,
+        doc_string="\n".join(f"{name}: {line}" for name, line in flight.facts.items()),
     )
+    helper.set_model_props(result, flight.facts)
     onnx.checker.check_model(result, full_check=True)
     return result
 

@@ -205,9 +205,9 @@ def _succeeds(main, arguments):
     assert main(arguments) == 0, arguments
 
 
-def _compile(arguments):
-    if shutil.which("cc"):
-        _process(["cc", *arguments])
+def _compile(compiler, arguments):
+    if shutil.which(compiler):
+        _process([compiler, *arguments])
 
 
 def _own_program(words):
@@ -225,7 +225,8 @@ RUNS = {
     "train.py": _train,
     "eval.py": _evaluate,
     "export.py": _export,
-    "cc": _compile,
+    "cc": functools.partial(_compile, "cc"),
+    "c++": functools.partial(_compile, "c++"),
     "own program": _own_program,
     "-c": lambda arguments: _process([sys.executable, "-c", *arguments]),
     "cd": lambda arguments: os.chdir(*arguments),

@@ -9,6 +9,7 @@ Example:
 
 import argparse
 import ctypes
+import functools
 import shutil
 import subprocess
 import tempfile
@@ -18,23 +19,43 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import AttitudeEnv, checkpoint, export_c, flight_policy, run_folder
-from attjax.flight_policy import Decisions, FlightPolicy
+from attjax import AttitudeEnv, assembly, checkpoint, export_c, flight_check, provenance, run_folder
+from attjax.flight_check import Decisions
+from attjax.flight_policy import FlightPolicy
+from attjax.networks import Policy
+from attjax.specification import LM50
 
 SLEWS = 400
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror")
+STRICT = ("-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror")
 
 
 def load(folder: Path, frameskip: int) -> FlightPolicy:
     """The newest policy of a run folder, to fly at this rate."""
     policy, params = checkpoint.restore_network(folder)
-    env = AttitudeEnv(frameskip, spacecraft=run_folder.read_config(folder).spacecraft)
-    return FlightPolicy(policy, params, env, f"a run in {Path(folder).name}")
+    config, update = run_folder.read_config(folder), checkpoint.latest(folder)
+    env = AttitudeEnv(frameskip, spacecraft=config.spacecraft)
+    return FlightPolicy(policy, params, env, provenance.of_run(config, update, update))
 
 
-def compiler() -> str | None:
-    """The C compiler, if there is one."""
-    return shutil.which("cc") or shutil.which("gcc")
+@functools.cache
+def untrained(features, hidden_sizes, rate_margin, spacecraft=LM50) -> FlightPolicy:
+    """Random weights, and biases too, that leave the decision to the state."""
+    policy = Policy(features, hidden_sizes, spacecraft.num_actions, rate_margin)
+    shapes = jax.eval_shape(lambda: assembly.initial_parameters(policy)["policy"])
+    leaves, tree = jax.tree.flatten(shapes)
+    rng = np.random.default_rng(5)
+    leaves = [rng.normal(0, (0.1, 1.0)[x.ndim - 1], x.shape).astype(np.float32) for x in leaves]
+    params, env = (
+        {"policy": jax.tree.unflatten(tree, leaves)},
+        AttitudeEnv(10, spacecraft=spacecraft),
+    )
+    return FlightPolicy(policy, params, env, provenance.Origin("no training"))
+
+
+def compiler(language: str = "c") -> str | None:
+    """The compiler of C or C++, if there is one."""
+    names = {"c": ("cc", "gcc"), "c++": ("c++", "g++")}[language]
+    return next(filter(None, map(shutil.which, names)), None)
 
 
 def write(folder: Path, contents: dict) -> Path:
@@ -45,18 +66,20 @@ def write(folder: Path, contents: dict) -> Path:
     return folder
 
 
-def compile_c(folder: Path, *flags) -> None:
-    """Run the compiler strictly; raises CalledProcessError on any warning."""
-    command = [compiler(), *STRICT, *map(str, flags)]
+def compile_c(folder: Path, *flags, language: str = "c") -> None:
+    """Run the compiler of C99 or C++11 strictly; fails on any warning."""
+    standard = {"c": ["-std=c99"], "c++": ["-std=c++11", "-x", "c++"]}[language]
+    command = [compiler(language), *standard, *STRICT, *map(str, flags)]
     result = subprocess.run([*command, "-lm"], cwd=folder, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
 
 
-def run_test_program(folder: Path, *flags) -> str:
+def run_test_program(folder: Path, *flags, language: str = "c", status: int = 0) -> str:
     """Compile attjax_test.c and run it; returns what it prints."""
-    compile_c(folder, "-O2", *flags, "attjax_test.c", "attjax_policy.c", "-o", "attjax_test")
+    sources = "attjax_test.c", "attjax_policy.c"
+    compile_c(folder, "-O2", *flags, *sources, "-o", "attjax_test", language=language)
     result = subprocess.run([folder / "attjax_test"], capture_output=True, text=True, timeout=60)
-    assert result.returncode == 0, result.stdout
+    assert result.returncode == status, result.stdout
     return result.stdout
 
 
@@ -97,6 +120,34 @@ def stablehlo_outputs(serialized: bytes, states: Decisions) -> list[np.ndarray]:
     return [np.asarray(x) for x in run(states.quaternion, states.angular_velocity)]
 
 
+def stablehlo_main(bytecode: bytes):
+    """The module of the bytecode, and its function main."""
+    from jaxlib.mlir import ir
+    from jaxlib.mlir.dialects import stablehlo
+
+    context = ir.Context()
+    stablehlo.register_dialect(context)
+    module = stablehlo.deserialize_portable_artifact(context, bytecode)
+    return module, next(op for op in module.body.operations if op.name.value == "main")
+
+
+def bytecode_actions(bytecode: bytes, states: Decisions) -> np.ndarray:
+    """Actions of main(quaternion, angular velocity), which XLA compiles without JAX's layers."""
+    from jaxlib import xla_client
+
+    client, devices = jax.devices("cpu")[0].client, tuple(jax.devices("cpu")[:1])
+    text = str(stablehlo_main(bytecode)[0])
+    compiled = client.compile_and_load(
+        text, xla_client.DeviceList(devices), xla_client.CompileOptions()
+    )
+    actions = []
+    for state in zip(states.quaternion, states.angular_velocity):
+        arguments = [jax.device_put(x, devices[0]) for x in state]
+        results = compiled.execute_sharded(arguments).disassemble_into_single_device_arrays()
+        actions.append(int(np.asarray(results[0][0])))
+    return np.array(actions)
+
+
 def differing(states: Decisions, actions) -> tuple[int, int]:
     """How many actions differ from JAX's where the decision is clear, and elsewhere."""
     differ = np.asarray(actions) != states.action
@@ -119,7 +170,7 @@ def _report(arguments, frameskip):
     from attjax import export_onnx, export_stablehlo
 
     flight = load(arguments.checkpoint, frameskip)
-    states = flight_policy.flown_decisions(flight, arguments.seed, SLEWS, arguments.states // SLEWS)
+    states = flight_check.flown_decisions(flight, arguments.seed, SLEWS, arguments.states // SLEWS)
     print(f"frameskip {frameskip}: {len(states.clear):,} states of {SLEWS} slews")
     with tempfile.TemporaryDirectory() as scratch:
         folder = write(Path(scratch), export_c.files(flight, seed=0))

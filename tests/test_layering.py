@@ -19,7 +19,7 @@ LAYERS = [
         "sb3",
     },
     {"vector"},
-    {"settings", "programs", "context"},
+    {"settings", "programs", "context", "c_names", "c_text"},
     {"quaternion", "rigid_body"},
     {"dynamics"},
     {"spacecraft", "reward", "observation"},
@@ -30,9 +30,9 @@ LAYERS = [
     {"rollout", "descent"},
     {"ppo"},
     {"presets", "assembly", "run_folder", "nan_search"},
-    {"help_text", "panel"},
+    {"help_text", "panel", "provenance"},
     {"progress", "metrics", "report", "cli", "flight_policy"},
-    {"checkpoint", "config_file", "tensorboard"},
+    {"checkpoint", "config_file", "tensorboard", "flight_check"},
     {"training", "plots", "playback", "export_c", "export_onnx", "export_stablehlo"},
 ]
 LEARNING = {"networks", "losses", "learner", "rollout", "descent", "ppo"}

@@ -1,7 +1,19 @@
-/* Attitude control policy; see attjax_policy.h. Written by attjax $version. */
+/*
+ * Attitude control policy; see attjax_policy.h.
+ *
+$facts
+ */
 #include "attjax_policy.h"
 
 #include <math.h>
+
+#if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__)
+#error "without infinities and NaN (-ffast-math) a spoilt state would not lead to no torque"
+#endif
+
+#ifdef __cplusplus
+#define restrict /* which C++ does not have */
+#endif
 
 #define FEATURES $features
 

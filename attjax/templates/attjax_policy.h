@@ -1,14 +1,18 @@
 /*
  * Attitude control policy: which of $actions torques to apply next.
  *
- * Written by attjax $version from a policy trained with it:
- * $origin.
+ * Where it comes from:
+ *
+$facts
  *
  * Call attjax_decide once every ATTJAX_CONTROL_PERIOD, then apply the torque
  * attjax_torque_table[action] for the first ATTJAX_PULSE of that period.
  *
- * The policy was trained for one spacecraft, $spacecraft, with the $inertia
- * kg m^2 in the axes of the body frame, and for these torques, this control period and this rate limit. It is valid for no other.
+ * It is for one spacecraft alone, for these torques, this control period and this rate limit, and
+ * for a desired frame that does not turn; whether it was trained for them stands above.
+ *
+ *   inertia:     $inertia
+ *   rate limit:  $kept_rate
  *
  * Static size:  $constant_bytes bytes of constants, no variables;
  *               $stack_bytes bytes of arrays on the stack, at most, in a call.

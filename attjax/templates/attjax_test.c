@@ -1,11 +1,13 @@
 /*
  * Tests the policy on the machine where it is to fly: the decisions of attjax_vectors.h, numbers
  * that are not finite, and slews in a closed loop with a rigid body in double precision. Prints
- * what it finds and the time of a decision; the exit status is 0 if all is well.
+ * what it finds and the time of a decision. The exit status is 0 if all is well: the decisions are
+ * as in attjax, no torque follows what is not finite, and each slew ends within the goal angle
+ * without ever having passed the rate limit.
  *
  *     cc -std=c99 -O2 attjax_test.c attjax_policy.c -o attjax_test -lm && ./attjax_test
  *
- * Written by attjax $version.
+$facts
  */
 #include <math.h>
 #include <stdio.h>
@@ -97,25 +99,33 @@ static void control(double x[STATE])
     }
 }
 
-/* Fly the slews; returns how many miss the goal where they do not in attjax. */
+/* Fly the slews; returns how many miss the goal or pass the rate limit, as in attjax or not. */
 static int fly(void)
 {
     int failures = 0;
 
     for (int s = 0; s < SLEWS; s++) {
         double x[STATE] = {0.0};
-        double error;
+        double error, largest_rate = 0.0;
         for (int i = 0; i < 4; i++) {
             x[i] = slew_start[s][i];
         }
         for (int n = 0; n < DECISIONS; n++) {
             control(x);
+            largest_rate = fmax(largest_rate, norm(x + 4, 3));
         }
         error = 2.0 * atan2(norm(x, 3), x[3]) * DEG_PER_RAD;
         printf("slew %d: error at the end %.6f deg, in attjax %.6f; ", s + 1, error,
                slew_error_deg[s]);
         printf("rate %.6f rad/s, in attjax %.6f\n", norm(x + 4, 3), slew_rate[s]);
-        failures += slew_error_deg[s] <= GOAL_DEG && !(error <= GOAL_DEG);
+        if (!(error <= GOAL_DEG)) { /* of NaN, too */
+            printf("slew %d: FAILED: the goal is an error of %g deg at most\n", s + 1, GOAL_DEG);
+            failures++;
+        } else if (!(largest_rate <= (double)ATTJAX_RATE_LIMIT)) {
+            printf("slew %d: FAILED: a rate of %.6f rad/s passes the limit of %g\n", s + 1,
+                   largest_rate, (double)ATTJAX_RATE_LIMIT);
+            failures++;
+        }
     }
     return failures;
 }

@@ -1,4 +1,8 @@
-/* What the policy decided in attjax $version; included by attjax_test.c alone. */
+/*
+ * What the policy decided in attjax; included by attjax_test.c alone.
+ *
+$facts
+ */
 #ifndef ATTJAX_VECTORS_H
 #define ATTJAX_VECTORS_H
 

@@ -1,0 +1,66 @@
+"""Numbers, tables and comments as C and C++ read them."""
+
+import textwrap
+
+import numpy as np
+
+NUMBERS_A_LINE = 8
+COMMENT_WIDTH = 97
+
+
+def number(x) -> str:
+    """A constant that is exactly this float32, to the sign of a zero.
+
+    Raises:
+        ValueError: it is not finite in float32.
+
+    Example:
+        >>> number(0.1), number(-0.0), number(1e-45)
+        ('0.1f', '-0.0f', '1e-45f')
+    """
+    with np.errstate(over="ignore"):
+        single = np.float32(x)
+    if not np.isfinite(single):
+        raise ValueError(f"{x} is not finite in single precision")
+    return str(single) + "f"
+
+
+def double(x) -> str:
+    """A constant that is exactly this number; NAN and INFINITY are those of math.h."""
+    names = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
+    return names.get(repr(float(x)), repr(float(x)))
+
+
+def table(values, form=number) -> str:
+    """An initialiser of a vector, some numbers a line, or of a matrix, a row a line."""
+    values = np.asarray(values)
+    if values.ndim == 1:
+        cuts = range(NUMBERS_A_LINE, values.size, NUMBERS_A_LINE)
+        rows = [row(part, form)[1:-1] for part in np.split(values, cuts)]
+    else:
+        rows = [row(part, form) for part in values]
+    return "{\n    " + ",\n    ".join(rows) + "}"
+
+
+def row(values, form=number) -> str:
+    """An initialiser of a vector, in one line."""
+    return "{" + ", ".join(map(form, np.asarray(values))) + "}"
+
+
+def comment(text: str, indent: str = "") -> str:
+    r"""Any text as lines of a C comment that is open, in ASCII, the later ones indented so.
+
+    Nothing in it ends the comment, opens another or is a trigraph.
+
+    Example:
+        >>> comment("a */ b /* c ??/ Å")
+        'a * / b / * c ? ?/ \\xc5'
+    """
+    plain = text.encode("ascii", "backslashreplace").decode()
+    for pair in ("*/", "/*", "??"):
+        while pair in plain:
+            plain = plain.replace(pair, " ".join(pair))
+    later = " * " + indent
+    first = " " * len(later)
+    lines = textwrap.wrap(plain, COMMENT_WIDTH, initial_indent=first, subsequent_indent=later)
+    return "\n".join(lines).strip()

@@ -1,0 +1,121 @@
+"""What a policy does at states and on slews, for its exports to be checked against."""
+
+import dataclasses
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from attjax import evaluation, flight_policy, networks
+from attjax import quaternion as quaternions
+from attjax.flight_policy import FlightPolicy
+
+TIE = 1e-4
+"""Actions whose logits differ by less than this share of the logits' range are tied."""
+
+MASK_ROUNDING = 1e-6
+"""Relative change of ω that must not change which actions are masked in a clear decision."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Decisions:
+    """States, and what the policy does there.
+
+    Attributes:
+        quaternion, angular_velocity: (states, 4) and (states, 3).
+        action: (states,) int32.
+        logits: (states, actions), MASKED_LOGIT where masked.
+        clear: (states,) bool, whether rounding cannot decide: the two best actions are no tie,
+            and no action is within rounding of being masked or not.
+    """
+
+    quaternion: np.ndarray
+    angular_velocity: np.ndarray
+    action: np.ndarray
+    logits: np.ndarray
+    clear: np.ndarray
+
+
+def decisions(flight: FlightPolicy, quaternion, angular_velocity) -> Decisions:
+    """What the policy does at the states (states, 4) and (states, 3)."""
+    quaternion, angular_velocity = (
+        np.asarray(x, np.float32) for x in (quaternion, angular_velocity)
+    )
+    action, logits = map(np.asarray, _decide_all(flight, quaternion, angular_velocity))
+    nearby = [
+        np.asarray(_decide_all(flight, quaternion, angular_velocity * np.float32(1 + change))[1])
+        for change in (-MASK_ROUNDING, MASK_ROUNDING)
+    ]
+    masked = logits == networks.MASKED_LOGIT
+    same_mask = [np.all((x == networks.MASKED_LOGIT) == masked, axis=1) for x in nearby]
+    clear = _not_tied(logits, masked) & same_mask[0] & same_mask[1]
+    return Decisions(quaternion, angular_velocity, action, logits, clear)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _decide_all(flight, quaternion, angular_velocity):
+    return jax.vmap(functools.partial(flight_policy.decide, flight))(quaternion, angular_velocity)
+
+
+def _not_tied(logits, masked):
+    """Whether the best logit leads the second by TIE of their range; not if one is NaN."""
+    second, best = np.sort(np.where(masked, -np.inf, logits), axis=1)[:, -2:].T
+    least = np.min(np.where(masked, np.inf, logits), axis=1)
+    with np.errstate(invalid="ignore"):
+        return best - second > TIE * (best - least)
+
+
+def flown_decisions(flight: FlightPolicy, seed: int, slews: int, states_per_slew: int) -> Decisions:
+    """Decisions at states evenly spaced in time along random slews that the policy flies."""
+    params = flight.env.default_params
+    _, start = evaluation.random_slews(flight.env, params, jax.random.key(seed), slews)
+    act = jax.tree_util.Partial(flight.policy.act, flight.params)
+    steps = int(params.max_steps_in_episode)
+    history = evaluation.record(act, flight.env, params, start, steps)
+    chosen = np.linspace(0, steps - 1, states_per_slew).astype(int)
+    states = (np.asarray(x)[chosen] for x in (history.quaternion, history.angular_velocity))
+    return decisions(flight, *(x.reshape(-1, x.shape[-1]) for x in states))
+
+
+@dataclasses.dataclass(frozen=True)
+class Flown:
+    """Slews that were flown: start (slews, 4), terminal φ and ‖ω‖ (slews,), float64.
+
+    They are NaN where the simulation did not converge.
+    """
+
+    quaternion: np.ndarray
+    error_deg: np.ndarray
+    rate: np.ndarray
+
+
+def fly_table_5(flight: FlightPolicy) -> Flown:
+    """Fly the slews of evaluation.TABLE_5, by an angle that is the spacecraft's task.
+
+    The spacecraft is simulated in float64, with the float32 constants that the policy knows, and
+    the policy is told its state in float32. That is what the C test program does, so both see
+    the same states for as long as they decide alike.
+    """
+    act = jax.tree_util.Partial(flight.act_in_float32)
+    with jax.enable_x64(True):
+        params = flight.env.default_params.replace(
+            inertia=jnp.asarray(flight.context.inertia, float),
+            torque_table=jnp.asarray(flight.torque_table, float),
+        )
+        steps, start = int(params.max_steps_in_episode), _table_5(flight.env.spacecraft)
+        history = evaluation.record(act, flight.env, params, start, steps)
+        angle = jnp.rad2deg(jax.vmap(quaternions.error_angle)(history.quaternion[-1]))
+        rate = jnp.linalg.norm(history.angular_velocity[-1], axis=-1)
+        return Flown(*map(np.asarray, (start.quaternion, angle, rate)))
+
+
+def _table_5(craft):
+    """The slews of Table 5, about the same axes by fewer or more than 100° where it must be."""
+    start, (least, most) = evaluation.table_5_slews(), craft.slew_angles_deg
+    if least <= 100 <= most:
+        return start
+    axes = start.quaternion[:, :3] / jnp.linalg.norm(start.quaternion[:, :3], axis=1)[:, None]
+    angle = jnp.deg2rad(jnp.clip(100.0, least, most))
+    turned = jax.vmap(quaternions.from_axis_angle, (0, None))(axes, angle)
+    return start.replace(quaternion=turned)
