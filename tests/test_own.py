@@ -117,7 +117,8 @@ def test_bad_spacecraft_files(tmp_path, capsys, text, expected):
 
 def test_a_mask_that_leaves_no_torque_is_refused(tmp_path, capsys):
     path = tmp_path / "strong.toml"
-    path.write_text("inertia = [0.05, 0.14, 0.17]\ntorque_levels = [2.0, 1.0]\ntorque_held = true\n")
+    inertia = "inertia = [0.05, 0.14, 0.17]"
+    path.write_text(f"{inertia}\ntorque_levels = [2.0, 1.0]\ntorque_held = true\n")
     flags = [*TINY, "--preset", "precise", "--spacecraft", str(path), "--frameskips", "23"]
     message = one_line_error(
         train_script.main, [*flags, "--checkpoint", str(tmp_path / "run")], capsys
