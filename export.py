@@ -4,7 +4,7 @@ import importlib
 import sys
 from pathlib import Path
 
-from attjax import cli, help_text, run_folder, settings
+from attjax import cli, run_folder, settings
 
 FORMATS = {"c": "export_c", "onnx": "export_onnx", "stablehlo": "export_stablehlo"}
 NEEDED = {"export_onnx": "onnx", "export_stablehlo": "flatbuffers"}
@@ -40,9 +40,9 @@ def _add_output(group):
     group.add_argument("--overwrite", action="store_true", help=overwrite_help)
 
 
+@cli.program("export.py")
 def main(argv=None) -> int:
     """Export a checkpoint; returns the exit status."""
-    help_text.print_anywhere()
     arguments = parse_arguments(argv)
     with cli.one_line_errors("export.py", run_folder.FolderError):
         cli.select_device(arguments.device)
@@ -53,7 +53,8 @@ def main(argv=None) -> int:
         with run_folder.writing(arguments.out):
             for name, content in contents.items():
                 run_folder.replace(arguments.out / name, content)
-                print(f"wrote {arguments.out / name}")
+        for name in contents:
+            print(f"wrote {arguments.out / name}")
     return 0
 
 

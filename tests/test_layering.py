@@ -9,6 +9,7 @@ import attjax
 
 LAYERS = [
     {"user_functions", "specification", "template", "checks", "spaces", "kernel", "vector", "sb3"},
+    {"belongings", "streams"},
     {"settings", "programs", "context"},
     {"quaternion", "rigid_body"},
     {"dynamics"},

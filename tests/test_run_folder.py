@@ -1,7 +1,6 @@
 """The folder of a run: what it refuses, and that no moment of a crash leaves it unusable."""
 
 import json
-import os
 import subprocess
 import sys
 
@@ -37,17 +36,6 @@ def test_a_run_is_not_overwritten_unless_asked(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["3", "config.json"]
 
 
-def test_overwrite_removes_the_run_and_nothing_else(tmp_path):
-    run_folder.create(tmp_path, CONFIG, overwrite=False)
-    for name in ("7", "8.orbax-checkpoint-tmp", "9.removed"):
-        (tmp_path / name / "policy").mkdir(parents=True)
-    for name in ("metrics.csv", "metrics.csv.tmp", "config.json.tmp"):
-        (tmp_path / name).write_text("x")
-    (tmp_path / "figure.png").write_text("precious")
-    run_folder.create(tmp_path, CONFIG, overwrite=True)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["config.json", "figure.png"]
-
-
 def test_a_run_of_an_older_format_can_be_overwritten(tmp_path):
     run_folder.create(edited(tmp_path, format=1), CONFIG, overwrite=True)
     assert run_folder.read_config(tmp_path) == CONFIG
@@ -65,52 +53,6 @@ def test_a_process_killed_while_it_began_leaves_a_folder_that_can_begin(tmp_path
     (tmp_path / "config.json.tmp").write_text('{"program": "att')
     run_folder.create(tmp_path, CONFIG, overwrite=False)
     assert run_folder.read_config(tmp_path) == CONFIG
-
-
-def test_overwriting_that_is_killed_leaves_the_old_run_or_the_new_one(tmp_path, monkeypatch):
-    """Killed at each of its steps in turn: no checkpoint is ever half there under its own name."""
-    new = run_folder.Config("paper", 1, CONFIG.settings)
-    for step in range(100):
-        folder = tmp_path / str(step)
-        folder.mkdir()
-        run_folder.create(folder, CONFIG, overwrite=False)
-        for number in ("1", "2"):
-            (folder / number).mkdir()
-            (folder / number / "a").touch()
-            (folder / number / "b").touch()
-        (folder / "tensorboard").mkdir()
-        (folder / "tensorboard" / "events.out.tfevents.1.attjax").touch()
-        if not killed_at(step, lambda: run_folder.create(folder, new, True), monkeypatch):  # noqa: B023
-            break
-        assert run_folder.read_config(folder) in (CONFIG, new)
-        for path in folder.iterdir():
-            assert not path.name.isdigit() or len(list(path.iterdir())) == 2
-        run_folder.create(folder, new, overwrite=True)
-        assert [p.name for p in folder.iterdir()] == ["config.json"]
-    assert 5 < step < 99
-
-
-def killed_at(step, action, monkeypatch) -> bool:
-    """Run an action that dies before its ``step``-th change to the file system; whether it did."""
-    changes = []
-
-    def counted(function):
-        def call(*arguments, **options):
-            changes.append(function)
-            if len(changes) > step:
-                raise KeyboardInterrupt
-            return function(*arguments, **options)
-
-        return call
-
-    with monkeypatch.context() as patch:
-        for name in ("unlink", "rename", "rmdir", "replace"):
-            patch.setattr(os, name, counted(getattr(os, name)))
-        try:
-            action()
-        except KeyboardInterrupt:
-            return True
-    return False
 
 
 def edited(tmp_path, **changes):
@@ -160,4 +102,5 @@ with run_folder.opened(pathlib.Path({str(tmp_path)!r})):
             pass
         other.kill()
     with run_folder.opened(tmp_path):
-        assert list(tmp_path.iterdir()) == []
+        pass
+    assert list(tmp_path.iterdir()) == []
