@@ -15,7 +15,8 @@ from pathlib import Path
 
 CONFIG, METRICS = "config.json", "metrics.csv"
 EVENTS = "tensorboard"
-LOCK, SAVING, REMOVED, REPLACED = ".lock", ".saving", ".removed", ".replaced"
+LOCK, SAVING = ".attjax-lock", ".attjax-saving"
+REMOVED, REPLACED = ".attjax-removed", ".attjax-replaced"
 """Of a process at work: its lock, a checkpoint not yet whole, one half removed, a replaced run."""
 
 BEGUN = {CONFIG + ".tmp", LOCK}

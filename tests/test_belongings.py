@@ -102,7 +102,7 @@ def test_nobody_is_advised_to_remove_what_is_not_the_runs(trained, tmp_path):
     with pytest.raises(FolderError, match=r"remove .*61 to go back"):
         checkpoint.restore_policy(folder)
     (folder / "61" / belongings.LABEL).unlink()  # so it may be anyone's
-    with pytest.raises(FolderError, match="61.*cannot be read") as error:
+    with pytest.raises(FolderError, match=r"61.*cannot be read") as error:
         checkpoint.restore_policy(folder)
     assert "remove" not in str(error.value)
 
@@ -188,7 +188,7 @@ def test_what_may_not_be_removed_is_seen_before_anything_is_moved(tmp_path, monk
     before = names(folder)
     may = os.access
     monkeypatch.setattr(os, "access", lambda path, mode: may(path, mode) and "learner" not in path)
-    with pytest.raises(FolderError, match="cannot be written: Permission denied .*learner"):
+    with pytest.raises(FolderError, match=r"cannot be written: Permission denied .*learner"):
         run_folder.create(folder, NEW, overwrite=True)
     assert names(folder) == before and run_folder.read_config(folder) == CONFIG
 

@@ -135,11 +135,11 @@ def test_other_networks_are_refused_in_one_line(trained, tmp_path):
 def test_half_written_checkpoints_are_cleared_away(trained, tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(trained[0], folder)
-    for leftover in (".saving/checkpoint", ".removed/1"):
+    for leftover in (".attjax-saving/checkpoint", ".attjax-removed/1"):
         shutil.copytree(folder / "2", folder / leftover)
     assert checkpoint.latest(folder) == 2
     with run_folder.opened(folder):
-        assert sorted(p.name for p in folder.iterdir()) == [".lock", "2", "config.json"]
+        assert sorted(p.name for p in folder.iterdir()) == [".attjax-lock", "2", "config.json"]
 
 
 def test_a_checkpoint_that_cannot_be_written_leaves_those_before(trained, tmp_path, monkeypatch):

@@ -1,6 +1,9 @@
 """The folder of a run: what it refuses, and that no moment of a crash leaves it unusable."""
 
+import errno
+import fcntl
 import json
+import os
 import subprocess
 import sys
 
@@ -104,3 +107,58 @@ with run_folder.opened(pathlib.Path({str(tmp_path)!r})):
     with run_folder.opened(tmp_path):
         pass
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_lock_is_a_file_open_for_writing(tmp_path, monkeypatch):
+    """As file systems on a network ask for."""
+    modes = []
+    monkeypatch.setattr(
+        run_folder.fcntl, "flock", lambda lock, _: modes.append(fcntl.fcntl(lock, fcntl.F_GETFL))
+    )
+    with run_folder.opened(tmp_path):
+        pass
+    assert [mode & os.O_ACCMODE for mode in modes] == [os.O_RDWR]
+
+
+@pytest.mark.parametrize("code", [errno.ENOLCK, errno.EOPNOTSUPP, errno.EBADF, None])
+def test_a_folder_that_cannot_be_locked_is_used_and_said_to_be_unprotected(
+    tmp_path, monkeypatch, capsys, code
+):
+    def unlockable(*_):
+        raise OSError(code, os.strerror(code))
+
+    if code is None:  # as on Windows
+        monkeypatch.setattr(run_folder, "fcntl", None)
+    else:
+        monkeypatch.setattr(run_folder.fcntl, "flock", unlockable)
+    with run_folder.opened(tmp_path):
+        run_folder.create(tmp_path, CONFIG, overwrite=False)
+    error = capsys.readouterr().err
+    assert f"{tmp_path} is not protected from a second train.py: " in error
+    assert error.count("\n") == 1
+
+
+def test_a_lock_that_its_owner_removed_meanwhile_is_taken_anew(tmp_path, monkeypatch):
+    flock, path = fcntl.flock, tmp_path / ".attjax-lock"
+
+    def late(lock, how):
+        flock(lock, how)
+        monkeypatch.setattr(run_folder.fcntl, "flock", flock)
+        path.unlink()
+
+    monkeypatch.setattr(run_folder.fcntl, "flock", late)
+    with run_folder.opened(tmp_path):
+        with pytest.raises(FolderError, match="in use"), run_folder.opened(tmp_path):
+            pass
+        assert path.exists()
+    assert not path.exists()
+
+
+def test_a_folder_of_someone_else_is_left_without_a_trace(tmp_path):
+    for name in (".attjax-removed", ".attjax-saving", ".attjax-replaced", ".lock"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "metrics.csv.tmp").touch()
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(FolderError, match="not empty"), run_folder.opened(tmp_path):
+        run_folder.create(tmp_path, CONFIG, overwrite=True)
+    assert sorted(tmp_path.iterdir()) == before
