@@ -31,7 +31,7 @@ def test_a_run_may_be_anywhere(tmp_path, state, name):
             run_folder.create(folder, CONFIG, overwrite=False)
             with checkpoint.Saver(folder) as saver:
                 for update in range(5):
-                    saver.save(state.replace(update=np.int32(update)), 1.0)
+                    saver.save(state.replace(update=np.int32(update)), 9.0 - update)
         assert sorted(os.listdir(folder)) == ["2", "3", "4", "config.json"]
         assert checkpoint.best(folder) == checkpoint.latest(folder) == 4
         act = checkpoint.restore_policy(folder)
