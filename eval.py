@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from attjax import cli, config_file, help_text, run_folder
+from attjax import cli, config_file, run_folder
 from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
 
 POLICY = "policy"
@@ -71,9 +71,9 @@ def _add_output(group):
     group.add_argument("--playback", type=Path, metavar="FILE", help=playback_help)
 
 
+@cli.program("eval.py")
 def main(argv=None) -> int:
     """Evaluate a checkpoint or a classical controller; returns the exit status."""
-    help_text.print_anywhere()
     arguments = parse_arguments(argv)
     advice = "fewer --episodes take less"
     with cli.one_line_errors("eval.py", run_folder.FolderError), cli.enough_memory(advice):
@@ -90,7 +90,7 @@ def main(argv=None) -> int:
 
 
 def _evaluate(arguments, controllers, spacecraft, plots, metrics):
-    """Fly, print, draw and write."""
+    """Fly, draw, write and print."""
     # Imported late: with them, --help and errors in the arguments would take seconds.
     import jax
 
@@ -99,7 +99,7 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics):
     env = AttitudeEnv(arguments.frameskip, spacecraft=spacecraft)
     params = env.default_params
     start = time.monotonic()
-    seed, results = arguments.seed or 0, []
+    seed, results, written = arguments.seed or 0, [], []
     conditions = evaluation.conditions(env, params, seed, arguments.episodes)
     for name, controller in controllers.items():
         flown = evaluation.fly(controller, env, params, jax.random.key(seed), arguments.episodes)
@@ -108,19 +108,24 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics):
         if plots:
             folder = arguments.plot / name if arguments.compare else arguments.plot
             flight = plots.Flight(controller, env, params, seed, flown)
-            for path in plots.write_all(flight, folder, metrics if name == POLICY else []):
-                print(f"wrote {path}")
-    if arguments.compare:
-        report.print_comparison(results, spacecraft)
-    else:
-        report.print_report(results[0], spacecraft)
-    print(f"evaluated in {time.monotonic() - start:.1f} s, compilation included")
-    if arguments.json:
-        content = {"controllers": results} if arguments.compare else results[0]
-        with run_folder.writing(arguments.json):
-            arguments.json.write_text(json.dumps(content, indent=2) + "\n")
-    if arguments.playback:
-        _write_playback(arguments, controllers, env, params)
+            written += plots.write_all(flight, folder, metrics if name == POLICY else [])
+    seconds = time.monotonic() - start
+    try:
+        if arguments.json:
+            content = {"controllers": results} if arguments.compare else results[0]
+            with run_folder.writing(arguments.json):
+                arguments.json.write_text(json.dumps(content, indent=2) + "\n")
+        if arguments.playback:
+            _write_playback(arguments, controllers, env, params)
+            written.append(arguments.playback)
+    finally:  # where one of them fails, too
+        for path in written:
+            print(f"wrote {path}")
+        if arguments.compare:
+            report.print_comparison(results, spacecraft)
+        else:
+            report.print_report(results[0], spacecraft)
+        print(f"evaluated in {seconds:.1f} s, compilation included")
     return 0
 
 
@@ -174,7 +179,6 @@ def _write_playback(arguments, controllers, env, params):
     page = playback.page(shown, env, params, arguments.seed or 0, checkpoint)
     with run_folder.writing(arguments.playback):
         run_folder.replace(arguments.playback, page)
-    print(f"wrote {arguments.playback}")
 
 
 def _frameskip(arguments, names):

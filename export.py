@@ -6,7 +6,7 @@ import importlib
 import sys
 from pathlib import Path
 
-from attjax import c_names, cli, help_text, run_folder
+from attjax import c_names, cli, run_folder
 
 FORMATS = {"c": "export_c", "onnx": "export_onnx", "stablehlo": "export_stablehlo"}
 NEEDED = {"export_onnx": "onnx", "export_stablehlo": "flatbuffers"}
@@ -55,9 +55,9 @@ def _prefix(text):
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
+@cli.program("export.py")
 def main(argv=None) -> int:
     """Export a checkpoint; returns the exit status."""
-    help_text.print_anywhere()
     arguments = parse_arguments(argv)
     with cli.one_line_errors("export.py", run_folder.FolderError):
         cli.select_device(arguments.device)
@@ -70,7 +70,8 @@ def main(argv=None) -> int:
         with run_folder.writing(arguments.out):
             for name, content in contents.items():
                 run_folder.replace(arguments.out / name, content)
-                print(f"wrote {arguments.out / name}")
+        for name in contents:
+            print(f"wrote {arguments.out / name}")
     return 0
 
 

@@ -5,7 +5,7 @@ import importlib
 import sys
 from pathlib import Path
 
-from attjax import cli, config_file, help_text, presets, run_folder, settings
+from attjax import cli, config_file, presets, run_folder, settings
 from attjax.specification import LM50
 
 DEFAULT_PRESET = "precise"
@@ -61,9 +61,9 @@ def _add_logging(group):
     group.add_argument("--debug-nans", action="store_true", help=debug_help)
 
 
+@cli.program("train.py")
 def main(argv=None) -> int:
     """Run a training; returns the exit status."""
-    help_text.print_anywhere()
     arguments = parse_arguments(argv)
     with cli.one_line_errors("train.py", ValueError):
         given = _given(arguments)

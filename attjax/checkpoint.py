@@ -1,34 +1,34 @@
 """Checkpoints in a run folder, one Orbax folder a saved update, named by its number.
 
 Each holds two items: ``policy``, all that evaluation needs beside config.json, and ``learner``,
-all that training needs to go on. Orbax writes them beside and renames them when they are whole.
+all that training needs to go on; and a label (see :mod:`attjax.belongings`). It is written aside,
+read back, and moved into place whole.
 """
 
+import contextlib
 import functools
-import json
 import logging
+import os
 import re
 import shutil
 import sys
+import tempfile
 import traceback
 from pathlib import Path
 
 import jax
+import numpy as np
 import orbax.checkpoint as ocp
-from orbax.checkpoint import checkpoint_managers
 
-from attjax import assembly, run_folder
+from attjax import assembly, belongings, run_folder
 from attjax.learner import Learner
 from attjax.networks import Policy
 from attjax.run_folder import FolderError
 
 NEWEST_KEPT = 3
-BEST_BY = "terminal_error_deg"
-
-
-def _error(metrics):
-    return metrics[BEST_BY]
-
+PLAIN = r"[A-Za-z0-9_./ +=,@-]*"
+"""Paths that Orbax takes as they are. It looks for parts of a checkpoint by patterns that begin
+with the path, so that one with brackets would find none."""
 
 for name in ("absl", "asyncio"):  # where Orbax logs at length what it also raises
     logging.getLogger(name).setLevel(logging.CRITICAL)
@@ -45,60 +45,87 @@ def _hook(unraisable):
 
 
 class Saver:
-    """Saves learners into a run folder; use as a context manager.
+    """Saves learners into a run folder that is open; use as a context manager.
 
-    Of the checkpoints it keeps the newest three, and the one with the least terminal error.
+    Of the run's checkpoints it keeps the newest three, and the one with the least terminal error.
     """
 
     def __init__(self, folder: Path):
         sys.unraisablehook = _hook
-        self._folder = Path(folder)
-        for leftover in self._folder.glob("[0-9]*.orbax-checkpoint-tmp*"):
-            shutil.rmtree(leftover, ignore_errors=True)
-        newest = checkpoint_managers.LatestN(NEWEST_KEPT)
-        best = checkpoint_managers.BestN(
-            get_metric_fn=_error, reverse=True, n=1, keep_checkpoints_without_metrics=False
-        )
-        self._manager = ocp.CheckpointManager(
-            self._folder.absolute(),
-            options=ocp.CheckpointManagerOptions(
-                best_fn=_error,
-                best_mode="min",
-                preservation_policy=checkpoint_managers.AnyPreservationPolicy([newest, best]),
-                # Synchronous: the next block of updates reuses the buffers that are being written.
-                enable_async_checkpointing=False,
-            ),
-        )
+        self._folder, self._run = Path(folder), run_folder.run_id(Path(folder))
+        self._orbax = ocp.Checkpointer(ocp.CompositeCheckpointHandler())
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
-        self._manager.close()
+        self._orbax.close()
 
     def save(self, learner: Learner, terminal_error: float | None = None) -> None:
-        """Save at once; a checkpoint of the same update is left as it is.
+        """Save at once, and read it back; a checkpoint of the same update is left as it is.
 
         Args:
             learner: what to save.
             terminal_error: of the episodes that ended last, degrees; None if none did.
 
         Raises:
-            FolderError: it cannot be written. Those saved before are as they were.
+            FolderError: it cannot be written, or read back. Those saved before are as they were.
         """
         update = int(learner.update)
-        if update in self._manager.all_steps():
+        if update in _saved(self._folder):
             return
-        items = ocp.args.Composite(
-            policy=ocp.args.StandardSave(learner.params["policy"]),
-            learner=ocp.args.StandardSave(_storable(learner)),
-        )
-        metrics = {BEST_BY: float("inf") if terminal_error is None else terminal_error}
+        items = {"policy": learner.params["policy"], "learner": _storable(learner)}
+        error = float("inf") if terminal_error is None else terminal_error
+        saving = self._folder / belongings.SAVING
         try:
-            self._manager.save(update, args=items, metrics=metrics)
+            self._write(saving, items, error, update)
         except Exception as error:  # Orbax raises many kinds, for a full disk among others
             path, reason = self._folder / str(update), _first_sentence(error)
             raise FolderError(f"checkpoint {path} cannot be written: {reason}") from None
+        finally:
+            shutil.rmtree(saving, ignore_errors=True)
+        for path in self._superseded():
+            with contextlib.suppress(OSError):  # tried again after the next save
+                belongings.remove(path)
+
+    def _write(self, saving, items, error, update):
+        shutil.rmtree(saving, ignore_errors=True)
+        saving.mkdir()
+        whole = saving / "checkpoint"
+        with _plain(saving) as place:
+            saved = {name: ocp.args.StandardSave(item) for name, item in items.items()}
+            self._orbax.save(place / whole.name, args=ocp.args.Composite(**saved))
+            self._check(place / whole.name, items)
+        belongings.write_label(whole, self._run, error)
+        path = self._folder / str(update)
+        if os.path.lexists(path):  # of someone else
+            path = path.with_name(path.name + belongings.OWN_NAME)
+        os.rename(whole, path)
+
+    def _check(self, path, items):
+        """Read a checkpoint back: it must be what it was made of, to the bit."""
+        items = jax.tree.map(np.asarray, items)
+        templates = {name: ocp.args.StandardRestore(item) for name, item in items.items()}
+        found = self._orbax.restore(path, args=ocp.args.Composite(**templates))
+        for name, item in items.items():
+            if not jax.tree.all(jax.tree.map(_same, item, found[name])):
+                raise ValueError(f"what was read back of its {name} differs")
+
+    def _superseded(self):
+        """The run's checkpoints but for the newest and the best."""
+        own = {
+            update: path
+            for update, path in _saved(self._folder).items()
+            if belongings.is_surely_own(path, self._run)
+        }
+        errors = {update: _error(path) for update, path in own.items()}
+        kept = {*list(own)[-NEWEST_KEPT:], _least(errors)}
+        return [path for update, path in own.items() if update not in kept]
+
+
+def _same(a, b):
+    b = np.asarray(b)
+    return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
 def latest(folder: Path) -> int | None:
@@ -112,20 +139,44 @@ def best(folder: Path) -> int | None:
     Raises:
         FolderError: the error of one cannot be read.
     """
-    errors = {}
-    for update in _saved(folder):
-        path = Path(folder) / str(update) / "metrics" / "metrics"
-        try:
-            errors[update] = float(_error(json.loads(path.read_text())))
-        except FileNotFoundError:  # of a version that did not write it
-            errors[update] = float("inf")
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise FolderError(f"{path} cannot be read: {error!r}") from None
-    return min(errors, key=errors.get, default=None)
+    return _least({update: _error(path) for update, path in _saved(folder).items()})
+
+
+def _error(path):
+    try:
+        return float(belongings.label(path)[belongings.BEST_BY])
+    except FileNotFoundError:  # of a version that did not write it
+        return float("inf")
+    except (OSError, ValueError, RecursionError) as error:
+        raise FolderError(f"{path / belongings.LABEL} cannot be read: {error!r}") from None
+
+
+def _least(errors):
+    """The update with the least error, the newest of equal ones."""
+    return min(errors, key=lambda update: (errors[update], -update), default=None)
 
 
 def _saved(folder):
-    return ocp.utils.checkpoint_steps(Path(folder).absolute())
+    """The run's checkpoints by their updates."""
+    folder = Path(folder)
+    run = run_folder.run_id(folder)
+    try:
+        return belongings.checkpoints(folder, run)
+    except OSError as error:
+        raise FolderError(f"{folder} cannot be read: {error.strerror}") from None
+
+
+@contextlib.contextmanager
+def _plain(path):
+    """The path, or a link to it whose name Orbax does not take for a pattern."""
+    path = path.absolute()
+    if re.fullmatch(PLAIN, str(path)):
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as scratch:
+        link = Path(scratch) / "folder"
+        link.symlink_to(path, target_is_directory=True)
+        yield link
 
 
 def restore_learner(folder: Path, template: Learner) -> Learner:
@@ -170,7 +221,10 @@ def restore_network(folder: Path, update: int | None = None) -> tuple[Policy, di
 def _restore(folder, update, item, template):
     if update is None:
         raise FolderError(f"{folder} holds no checkpoint yet")
-    path = (Path(folder) / str(update) / item).absolute()
+    saved = _saved(folder)
+    if update not in saved:
+        raise FolderError(f"{folder} holds no checkpoint {update}")
+    path = saved[update]
     device = jax.sharding.SingleDeviceSharding(jax.devices()[0])
     target = jax.tree.map(
         lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype, sharding=x.sharding or device), template
@@ -178,13 +232,14 @@ def _restore(folder, update, item, template):
     sys.unraisablehook = _hook
     with ocp.StandardCheckpointer() as checkpointer:
         try:
-            return checkpointer.restore(path, target)
+            with _plain(path) as place:
+                return checkpointer.restore(place / item, target)
         except Exception as error:  # Orbax raises many kinds for damaged files
             reason = _first_sentence(error)
     advice = ""
-    if len(_saved(folder)) > 1:
-        advice = f"; remove {path.parent} to go back to the checkpoint before it"
-    raise FolderError(f"checkpoint {path} cannot be read: {reason}{advice}")
+    if len(saved) > 1 and belongings.is_surely_own(path, run_folder.run_id(Path(folder))):
+        advice = f"; remove {path} to go back to the checkpoint before it"
+    raise FolderError(f"checkpoint {path.absolute() / item} cannot be read: {reason}{advice}")
 
 
 def _first_sentence(error):

@@ -5,14 +5,16 @@ import contextlib
 import dataclasses
 import functools
 import os
+import shlex
 import signal
 import sys
+import threading
 from pathlib import Path
 
-from attjax import help_text, settings, user_functions
+from attjax import help_text, settings, streams, user_functions
 
 DEVICES = ("auto", "cpu", "gpu")
-BAD_INPUT = 2
+OUTPUT_FAILED, BAD_INPUT = 1, 2
 TABLE_2 = 5
 """Frameskip of the paper's Table 2, 40 Hz."""
 
@@ -32,6 +34,35 @@ class Parser(argparse.ArgumentParser):
         _fail(self.prog, message)
 
 
+def program(name: str):
+    """Make a function a command: it prints anywhere, and goes on where printing fails.
+
+    Done all the same, it returns 1 instead of 0, with a line on stderr unless its reader left.
+    """
+
+    def decorate(main):
+        @functools.wraps(main)
+        def command(argv=None) -> int:
+            with streams.guarded():
+                help_text.print_anywhere()
+                try:
+                    status = main(argv)
+                except SystemExit as exit_:  # of --help, or of bad input
+                    if exit_.code or not streams.failure():
+                        raise
+                    status = 0
+                failure = streams.failure()
+                if status or failure is None:
+                    return status
+                if not streams.reader_left(failure):
+                    error_line(name, f"all is done, but stdout failed: {failure.strerror}")
+                return OUTPUT_FAILED
+
+        return command
+
+    return decorate
+
+
 @contextlib.contextmanager
 def one_line_errors(prog: str, *kinds: type[Exception]):
     """Turn exceptions of these kinds into one line on stderr and exit status 2."""
@@ -41,8 +72,13 @@ def one_line_errors(prog: str, *kinds: type[Exception]):
         _fail(prog, error)
 
 
-def _fail(prog, message):
+def error_line(prog: str, message) -> None:
+    """Print the message as one line on stderr."""
     print(f"{prog}: error: {' '.join(str(message).split())}", file=sys.stderr)
+
+
+def _fail(prog, message):
+    error_line(prog, message)
     sys.exit(BAD_INPUT)
 
 
@@ -58,29 +94,48 @@ def enough_memory(advice: str):
 
 
 class StopSignals:
-    """Notes SIGINT and SIGTERM, for the work to end where it can go on; a context manager.
+    """Notes signals that ask to stop, for the work to end where it can go on; a context manager.
 
-    A second one ends the process at once.
+    They are SIGINT and SIGTERM; SIGHUP of a terminal that is gone; and SIGUSR1, SIGUSR2 and
+    SIGXCPU, by which batch systems tell that time runs out. The latter four stay ignored where
+    they were, as after ``nohup``. A second SIGINT or SIGTERM ends the process at once; the others
+    come in pairs by themselves. Beside the main thread, where Python hears no signals, it notes
+    none.
 
     Attributes:
-        received: the signal's number, None before.
+        received: the first signal's number, None before.
     """
 
+    AT_ONCE = ("SIGINT", "SIGTERM")
+    BY_MACHINES = ("SIGHUP", "SIGUSR1", "SIGUSR2", "SIGXCPU")  # of which Windows has none
     received: int | None = None
 
     def __enter__(self):
-        signals = (signal.SIGINT, signal.SIGTERM)
-        self._before = {number: signal.signal(number, self._note) for number in signals}
+        self._at_once = _signals(self.AT_ONCE)
+        machines = [s for s in _signals(self.BY_MACHINES) if signal.getsignal(s) != signal.SIG_IGN]
+        in_main = threading.current_thread() is threading.main_thread()
+        heard = [*self._at_once, *machines] if in_main else []
+        self._before = {number: signal.signal(number, self._note) for number in heard}
         return self
 
     def __exit__(self, *_):
         for number, handler in self._before.items():
-            signal.signal(number, handler)
+            # None: a handler that was not Python's, which it cannot bring back.
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
     def _note(self, number, _):
-        self.received = number
-        for each in self._before:
+        self.received = self.received or number
+        for each in self._at_once:
             signal.signal(each, signal.SIG_DFL)
+
+
+def _signals(names):
+    return [getattr(signal, name) for name in names if hasattr(signal, name)]
+
+
+def quoted(path: Path) -> str:
+    """A path as a shell takes it, for advice to be copied."""
+    return shlex.quote(str(path))
 
 
 def add_checkpoint(group) -> None:

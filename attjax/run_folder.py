@@ -9,10 +9,12 @@ import contextlib
 import dataclasses
 import json
 import os
-import shutil
+import re
+import sys
+import uuid
 from pathlib import Path
 
-from attjax import settings, specification
+from attjax import belongings, settings, specification
 from attjax.settings import Settings
 from attjax.specification import LM50, Spacecraft
 
@@ -22,10 +24,7 @@ except ImportError:  # Windows, where runs are not kept apart
     fcntl = None
 
 FORMAT = 5
-CONFIG, METRICS = "config.json", "metrics.csv"
-OWN_FILES = {CONFIG, METRICS, CONFIG + ".tmp", METRICS + ".tmp"}
-EVENTS, EVENT_FILE = "tensorboard", "events.out.tfevents.{}.attjax"
-EVENT_FILES = EVENT_FILE.format("*") + "*"  # a killed process may leave one that ends in .tmp
+CONFIG, METRICS = belongings.CONFIG, belongings.METRICS
 
 
 class FolderError(Exception):
@@ -67,30 +66,50 @@ def writing(folder: Path):
 def opened(folder: Path):
     """Make the folder if there is none and keep other training processes out of it.
 
-    The lock is the operating system's, and ends with the process, however that ends.
+    The lock is the operating system's, and ends with the process, however that ends; what the
+    process was at then is cleared away at the next opening. Where there are no locks a line on
+    stderr says so.
 
     Raises:
         FolderError: another process trains in it, or it is no folder that can be written.
     """
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    if fcntl is None:
-        yield
-        return
-    with writing(folder):
-        descriptor = os.open(folder, os.O_RDONLY)
+        lock = _lock(folder)
     try:
+        if holds_run(folder):
+            with writing(folder), contextlib.suppress(FolderError):  # no run of ours: not touched
+                belongings.tidy(folder, run_id(folder))
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            (folder / belongings.LOCK).unlink()
+        os.close(lock)
+
+
+def _lock(folder):
+    """The descriptor of the lock file: open for writing, as file systems on a network need it."""
+    path = folder / belongings.LOCK
+    while True:
+        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if fcntl is None:
+                raise OSError("this system has no locks of the kind")
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
+            os.close(lock)
             raise FolderError(
                 f"{folder} is in use by another train.py; wait for it, or choose another folder"
             ) from None
-        except OSError:  # a file system without locks
-            pass
-        yield
-    finally:
-        os.close(descriptor)
+        except OSError as error:
+            reason = f"is not protected from a second train.py: {error.strerror or error}"
+            print(f"train.py: warning: {folder} {reason}", file=sys.stderr)
+            return lock
+        # Who held it may have ended, and removed the file, since it was opened here.
+        with contextlib.suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(lock), os.stat(path)):
+                return lock
+        os.close(lock)
 
 
 def holds_run(folder: Path) -> bool:
@@ -103,9 +122,10 @@ def create(folder: Path, config: Config, overwrite: bool) -> None:
 
     Raises:
         FolderError: it holds a run and ``overwrite`` is false, holds only something else,
-            or cannot be written. It is left as it was. Other files beside a run that is
-            overwritten stay.
+            or cannot be written. It is left as it was. Files beside a run that is overwritten,
+            and other runs' checkpoints, stay.
     """
+    new = _text(config, uuid.uuid4().hex[:12])
     with writing(folder):
         if holds_run(folder):
             if not overwrite:
@@ -113,26 +133,42 @@ def create(folder: Path, config: Config, overwrite: bool) -> None:
                     f"{folder} holds a run already: pass --resume to continue it, "
                     f"--overwrite to replace it, or another --checkpoint"
                 )
-            _read_json(folder / CONFIG)
-            _remove_run(folder)
-        elif not all(map(_is_own, folder.iterdir())):
+            belongings.replace_run(folder, run_id(folder), new)
+        elif any(path.name not in belongings.BEGUN for path in folder.iterdir()):
             raise FolderError(
                 f"{folder} is not empty and holds no attjax run; choose another folder"
             )
         else:
-            _remove_run(folder)
-        write_config(folder, config)
+            replace(folder / CONFIG, new)
+
+
+def run_id(folder: Path) -> str | None:
+    """The id of the folder's run, which its checkpoints carry; None of an earlier version's.
+
+    Raises:
+        FolderError: config.json cannot be read.
+    """
+    if not holds_run(folder):
+        return None
+    run = _read_json(folder / CONFIG).get("run")
+    if run is not None and not (isinstance(run, str) and re.fullmatch("[0-9a-f]+", run)):
+        raise FolderError(f"{folder / CONFIG} cannot be read: its run is {run!r:.40}")
+    return run
 
 
 def write_config(folder: Path, config: Config) -> None:
-    """Write config.json.
+    """Write the config.json of the folder's run anew.
 
     Raises:
         FolderError: it cannot be written.
     """
-    content = {"program": "attjax", "format": FORMAT, **dataclasses.asdict(config)}
     with writing(folder):
-        replace(folder / CONFIG, json.dumps(content, indent=2) + "\n")
+        replace(folder / CONFIG, _text(config, run_id(folder)))
+
+
+def _text(config, run):
+    content = {"program": "attjax", "format": FORMAT, "run": run, **dataclasses.asdict(config)}
+    return json.dumps(content, indent=2) + "\n"
 
 
 def replace(path: Path, content: str | bytes) -> None:
@@ -177,37 +213,3 @@ def _read_json(path):
     if not isinstance(content, dict) or content.get("program") != "attjax":
         raise FolderError(f"{path} was written by another program")
     return content
-
-
-def remove_events(folder: Path) -> None:
-    """Remove the event files that a run wrote; others in their folder stay."""
-    for path in (folder / EVENTS).glob(EVENT_FILES):
-        path.unlink()
-
-
-def _is_own(path):
-    """Whether nothing in it is of another program."""
-    if path.name != EVENTS:
-        return path.name in OWN_FILES
-    return path.is_dir() and all(inner.match(EVENT_FILES) for inner in path.iterdir())
-
-
-def _remove_run(folder):
-    """Remove all but config.json, which a new one replaces in the end.
-
-    A checkpoint is renamed first: half removed under its own name it would pass for a whole one.
-    """
-    for path in sorted(folder.iterdir()):
-        if path.is_dir() and path.name.split(".")[0].isdigit():
-            removed = path
-            if path.name.isdigit():
-                removed = path.with_name(path.name + ".removed")
-                shutil.rmtree(removed, ignore_errors=True)
-                path.rename(removed)
-            shutil.rmtree(removed)
-        elif path.name in OWN_FILES - {CONFIG}:
-            path.unlink()
-        elif path.name == EVENTS and path.is_dir():
-            remove_events(folder)
-            with contextlib.suppress(OSError):  # it holds other files, or is a link
-                path.rmdir()

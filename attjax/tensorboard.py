@@ -17,7 +17,7 @@ from tensorboardX.proto.summary_pb2 import Summary
 from tensorboardX.record_writer import masked_crc32c
 from tensorboardX.summary import hparams
 
-from attjax import metrics, run_folder
+from attjax import belongings, metrics, run_folder
 
 TAGS = {
     "episode_return": "episode/return",
@@ -61,10 +61,11 @@ class EventFile:
         seconds = float(rows[-1]["wall_s"]) if rows else 0.0
         self._start = time.time() - seconds  # as if the run had never paused
         events = [*_head(self._start, config), *(self._event(row) for row in rows)]
-        self._path = folder / run_folder.EVENTS / run_folder.EVENT_FILE.format(time.time_ns())
+        run = run_folder.run_id(folder)
+        self._path = folder / belongings.EVENTS / belongings.event_name(time.time_ns(), run)
         with run_folder.writing(folder):
             self._path.parent.mkdir(exist_ok=True)
-            run_folder.remove_events(folder)
+            belongings.remove_events(folder, run)
             run_folder.replace(self._path, b"".join(map(_record, events)))
 
     def append(self, row: dict) -> None:

@@ -1,6 +1,5 @@
 """A training run: blocks of updates, and between them metrics, checkpoints and signals."""
 
-import sys
 import time
 from pathlib import Path
 
@@ -95,13 +94,14 @@ class Run:
             with progress.Progress(total, self.agent_steps, rows, self.stop) as view:
                 diverged = self._loop(train_block, saver, view, save_every_s)
             if diverged:
-                print(f"train.py: error: {diverged}", file=sys.stderr)
+                cli.error_line("train.py", diverged)
                 return DIVERGED
             saver.save(self.learner, self.terminal_error)
         if self.stop.received is not None:
             print(f"stopped and saved at {self.agent_steps:,} agent steps; continue with --resume")
             return 128 + self.stop.received
-        print(f"trained; evaluate with: python eval.py --checkpoint {self.folder}")
+        folder = cli.quoted(self.folder)
+        print(f"trained; evaluate with: python eval.py --checkpoint {folder}")
         return 0
 
     def _compiled(self, debug_nans):

@@ -99,7 +99,7 @@ FAULTS = {
         "metrics.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
     ),
     "no lock on the folder": (
-        "run_folder.py", "fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,
+        "run_folder.py", "fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,
     ),
 }  # fmt: skip
 """By name: module, code, what it becomes, tests that should catch it."""

@@ -82,6 +82,8 @@ class Run:
             output = process.stdout.read()
         assert process.returncode == 0, output
         self._check_goes_on(output)
+        left = [path.name for path in self._folder.iterdir() if path.name.startswith(".")]
+        assert not left, f"{left} is left behind"
 
     def result(self) -> tuple[dict, list]:
         """All arrays of the newest checkpoint by name, and the metrics but the clock."""

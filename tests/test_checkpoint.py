@@ -135,10 +135,11 @@ def test_other_networks_are_refused_in_one_line(trained, tmp_path):
 def test_half_written_checkpoints_are_cleared_away(trained, tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(trained[0], folder)
-    (folder / "7.orbax-checkpoint-tmp" / "policy").mkdir(parents=True)
+    for leftover in (".attjax-saving/checkpoint", ".attjax-removed/1"):
+        shutil.copytree(folder / "2", folder / leftover)
     assert checkpoint.latest(folder) == 2
-    with checkpoint.Saver(folder):
-        assert sorted(p.name for p in folder.iterdir()) == ["2", "config.json"]
+    with run_folder.opened(folder):
+        assert sorted(p.name for p in folder.iterdir()) == [".attjax-lock", "2", "config.json"]
 
 
 def test_a_checkpoint_that_cannot_be_written_leaves_those_before(trained, tmp_path, monkeypatch):
@@ -149,7 +150,7 @@ def test_a_checkpoint_that_cannot_be_written_leaves_those_before(trained, tmp_pa
         raise OSError(28, "No space left on device")
 
     with checkpoint.Saver(folder) as saver:
-        monkeypatch.setattr(saver._manager, "save", full)
+        monkeypatch.setattr(saver._orbax, "save", full)
         with pytest.raises(FolderError, match="No space left on device"):
             saver.save(trained[3].replace(update=np.int32(9)))
     assert checkpoint.latest(folder) == 2

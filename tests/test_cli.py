@@ -199,7 +199,7 @@ def test_a_disk_that_is_full_is_not_taken_for_too_little_memory(tmp_path, monkey
     def full(*_, **__):
         raise ValueError("RESOURCE_EXHAUSTED: Failed to write: No space left on device")
 
-    monkeypatch.setattr(checkpoint.ocp.CheckpointManager, "save", full)
+    monkeypatch.setattr(checkpoint.ocp.Checkpointer, "save", full)
     arguments = [*TINY, "--total-steps", "1", "--checkpoint", str(tmp_path / "run")]
     with pytest.raises(SystemExit) as exit_:
         train_script.main(arguments)

@@ -18,7 +18,7 @@ LAYERS = [
         "numerics",
         "sb3",
     },
-    {"vector"},
+    {"vector", "belongings", "streams"},
     {"settings", "programs", "context", "c_names", "c_text"},
     {"quaternion", "rigid_body"},
     {"dynamics"},

@@ -1,5 +1,7 @@
 """The folder of a run: what it refuses, and that no moment of a crash leaves it unusable."""
 
+import errno
+import fcntl
 import json
 import os
 import subprocess
@@ -37,17 +39,6 @@ def test_a_run_is_not_overwritten_unless_asked(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["3", "config.json"]
 
 
-def test_overwrite_removes_the_run_and_nothing_else(tmp_path):
-    run_folder.create(tmp_path, CONFIG, overwrite=False)
-    for name in ("7", "8.orbax-checkpoint-tmp", "9.removed"):
-        (tmp_path / name / "policy").mkdir(parents=True)
-    for name in ("metrics.csv", "metrics.csv.tmp", "config.json.tmp"):
-        (tmp_path / name).write_text("x")
-    (tmp_path / "figure.png").write_text("precious")
-    run_folder.create(tmp_path, CONFIG, overwrite=True)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["config.json", "figure.png"]
-
-
 def test_a_run_of_an_older_format_can_be_overwritten(tmp_path):
     run_folder.create(edited(tmp_path, format=1), CONFIG, overwrite=True)
     assert run_folder.read_config(tmp_path) == CONFIG
@@ -65,52 +56,6 @@ def test_a_process_killed_while_it_began_leaves_a_folder_that_can_begin(tmp_path
     (tmp_path / "config.json.tmp").write_text('{"program": "att')
     run_folder.create(tmp_path, CONFIG, overwrite=False)
     assert run_folder.read_config(tmp_path) == CONFIG
-
-
-def test_overwriting_that_is_killed_leaves_the_old_run_or_the_new_one(tmp_path, monkeypatch):
-    """Killed at each of its steps in turn: no checkpoint is ever half there under its own name."""
-    new = run_folder.Config("paper", 1, CONFIG.settings)
-    for step in range(100):
-        folder = tmp_path / str(step)
-        folder.mkdir()
-        run_folder.create(folder, CONFIG, overwrite=False)
-        for number in ("1", "2"):
-            (folder / number).mkdir()
-            (folder / number / "a").touch()
-            (folder / number / "b").touch()
-        (folder / "tensorboard").mkdir()
-        (folder / "tensorboard" / "events.out.tfevents.1.attjax").touch()
-        if not killed_at(step, lambda: run_folder.create(folder, new, True), monkeypatch):  # noqa: B023
-            break
-        assert run_folder.read_config(folder) in (CONFIG, new)
-        for path in folder.iterdir():
-            assert not path.name.isdigit() or len(list(path.iterdir())) == 2
-        run_folder.create(folder, new, overwrite=True)
-        assert [p.name for p in folder.iterdir()] == ["config.json"]
-    assert 5 < step < 99
-
-
-def killed_at(step, action, monkeypatch) -> bool:
-    """Run an action that dies before its ``step``-th change to the file system; whether it did."""
-    changes = []
-
-    def counted(function):
-        def call(*arguments, **options):
-            changes.append(function)
-            if len(changes) > step:
-                raise KeyboardInterrupt
-            return function(*arguments, **options)
-
-        return call
-
-    with monkeypatch.context() as patch:
-        for name in ("unlink", "rename", "rmdir", "replace"):
-            patch.setattr(os, name, counted(getattr(os, name)))
-        try:
-            action()
-        except KeyboardInterrupt:
-            return True
-    return False
 
 
 def edited(tmp_path, **changes):
@@ -160,4 +105,60 @@ with run_folder.opened(pathlib.Path({str(tmp_path)!r})):
             pass
         other.kill()
     with run_folder.opened(tmp_path):
-        assert list(tmp_path.iterdir()) == []
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_lock_is_a_file_open_for_writing(tmp_path, monkeypatch):
+    """As file systems on a network ask for."""
+    modes = []
+    monkeypatch.setattr(
+        run_folder.fcntl, "flock", lambda lock, _: modes.append(fcntl.fcntl(lock, fcntl.F_GETFL))
+    )
+    with run_folder.opened(tmp_path):
+        pass
+    assert [mode & os.O_ACCMODE for mode in modes] == [os.O_RDWR]
+
+
+@pytest.mark.parametrize("code", [errno.ENOLCK, errno.EOPNOTSUPP, errno.EBADF, None])
+def test_a_folder_that_cannot_be_locked_is_used_and_said_to_be_unprotected(
+    tmp_path, monkeypatch, capsys, code
+):
+    def unlockable(*_):
+        raise OSError(code, os.strerror(code))
+
+    if code is None:  # as on Windows
+        monkeypatch.setattr(run_folder, "fcntl", None)
+    else:
+        monkeypatch.setattr(run_folder.fcntl, "flock", unlockable)
+    with run_folder.opened(tmp_path):
+        run_folder.create(tmp_path, CONFIG, overwrite=False)
+    error = capsys.readouterr().err
+    assert f"{tmp_path} is not protected from a second train.py: " in error
+    assert error.count("\n") == 1
+
+
+def test_a_lock_that_its_owner_removed_meanwhile_is_taken_anew(tmp_path, monkeypatch):
+    flock, path = fcntl.flock, tmp_path / ".attjax-lock"
+
+    def late(lock, how):
+        flock(lock, how)
+        monkeypatch.setattr(run_folder.fcntl, "flock", flock)
+        path.unlink()
+
+    monkeypatch.setattr(run_folder.fcntl, "flock", late)
+    with run_folder.opened(tmp_path):
+        with pytest.raises(FolderError, match="in use"), run_folder.opened(tmp_path):
+            pass
+        assert path.exists()
+    assert not path.exists()
+
+
+def test_a_folder_of_someone_else_is_left_without_a_trace(tmp_path):
+    for name in (".attjax-removed", ".attjax-saving", ".attjax-replaced", ".lock"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "metrics.csv.tmp").touch()
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(FolderError, match="not empty"), run_folder.opened(tmp_path):
+        run_folder.create(tmp_path, CONFIG, overwrite=True)
+    assert sorted(tmp_path.iterdir()) == before

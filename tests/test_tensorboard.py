@@ -177,16 +177,25 @@ def test_overwriting_removes_the_event_files_and_no_others(tmp_path, kept):
     assert found == ["config.json", *others]
 
 
-def test_leftover_event_files_give_way_and_those_of_others_are_refused(tmp_path):
-    tensorboard.EventFile(tmp_path, CONFIG, [])
-    run_folder.create(tmp_path, CONFIG, overwrite=False)
-    assert [p.name for p in tmp_path.iterdir()] == ["config.json"]
-    (tmp_path / "config.json").unlink()
-    tensorboard.EventFile(tmp_path, CONFIG, [])
-    (tmp_path / "tensorboard" / "events.out.tfevents.1.another").touch()
+@pytest.mark.parametrize("name", ["metrics.csv", "tensorboard/events.out.tfevents.1.attjax"])
+def test_what_a_run_without_configuration_left_is_refused_and_kept(tmp_path, name):
+    (tmp_path / "tensorboard").mkdir()
+    (tmp_path / name).touch()
     with pytest.raises(run_folder.FolderError, match="not empty"):
         run_folder.create(tmp_path, CONFIG, overwrite=False)
-    assert len(list((tmp_path / "tensorboard").iterdir())) == 2
+    assert (tmp_path / name).exists()
+
+
+def test_a_linked_folder_of_several_runs_loses_no_event_files(tmp_path):
+    (tmp_path / "events").mkdir()
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        run_folder.create(tmp_path / name, CONFIG, overwrite=False)
+        (tmp_path / name / "tensorboard").symlink_to(tmp_path / "events")
+        tensorboard.EventFile(tmp_path / name, CONFIG, [])
+    assert len(list((tmp_path / "events").iterdir())) == 2
+    tensorboard.EventFile(tmp_path / "one", CONFIG, [])
+    assert len(list((tmp_path / "events").iterdir())) == 2
 
 
 def test_without_tensorboardx_nothing_is_written(tmp_path, monkeypatch, capsys):
