@@ -66,8 +66,8 @@ def _check_that_torques_are_left(settings, craft):
         if np.sum(rate_mask(at_rest, context, settings.rate_margin)) <= 1:
             raise ValueError(
                 f"rate_margin {settings.rate_margin:g} masks every torque of {craft} with "
-                f"frameskip {frameskip}, even at rest: weaker torque_levels, a smaller frameskip or "
-                f"a larger rate_limit, or rate_margin 0, which masks nothing"
+                f"frameskip {frameskip}, even at rest; weaker torque_levels, smaller frameskips or "
+                f"a larger rate_limit leave some, and rate_margin 0 masks nothing"
             )
 
 
