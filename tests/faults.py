@@ -1,25 +1,8 @@
-"""Breaks the code on purpose, a fault at a time in a copy, and tells which test catches it first.
+"""Deliberate faults that no rule of mutants.py makes, each with the tests that should see it."""
 
-A fault that no test catches is an error.
-
-Example:
-    python tests/faults.py
-    python tests/faults.py --only "key reused"
-"""
-
-import argparse
-import os
-import re
-import shutil
-import subprocess
-import sys
-import tempfile
-from pathlib import Path
-
-ROOT = Path(__file__).resolve().parents[1]
-PHYSICS = ["test_truth.py", "test_dynamics.py", "test_quaternion.py", "test_env.py"]
-LEARNING = ["test_ppo.py", "test_rollout.py", "test_losses.py", "test_vector.py"]
-RUNS = ["test_checkpoint.py", "test_run_folder.py", "test_metrics.py", "test_cli.py"]
+PHYSICS = ["tests/test_truth.py", "tests/test_dynamics.py", "tests/test_quaternion.py", "tests/test_env.py"]
+LEARNING = ["tests/test_ppo.py", "tests/test_rollout.py", "tests/test_losses.py", "tests/test_vector.py"]
+RUNS = ["tests/test_checkpoint.py", "tests/test_run_folder.py", "tests/test_metrics.py", "tests/test_cli.py"]
 FAULTS = {
     "sign of the gyroscopic term": (
         "dynamics.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
@@ -51,21 +34,21 @@ FAULTS = {
     "terminal reward added, not replacing": (
         "reward.py", "jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
         "reward + jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
-        ["test_reward.py", "test_env.py"],
+        ["tests/test_reward.py", "tests/test_env.py"],
     ),
     "time limit before overspeed": (
         "env.py", "truncated = ~terminated & (next_state.time", "truncated = (next_state.time",
-        ["test_env.py"],
+        ["tests/test_env.py"],
     ),
     "GAE bootstraps over a termination": (
-        "losses.py", "jnp.where(terminated, 0.0, next_values)", "next_values", ["test_losses.py"],
+        "losses.py", "jnp.where(terminated, 0.0, next_values)", "next_values", ["tests/test_losses.py"],
     ),
     "GAE runs over the end of an episode": (
         "losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)",
-        ["test_losses.py"],
+        ["tests/test_losses.py"],
     ),
     "clipped objective without the pessimistic bound": (
-        "losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", ["test_losses.py"],
+        "losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", ["tests/test_losses.py"],
     ),
     "annealing off by one": (
         "learner.py", "gradient_steps = settings.num_updates * settings.passes",
@@ -81,7 +64,7 @@ FAULTS = {
     "reset state cached": (
         "env.py", "fresh_observation, fresh_state = self.reset_env(key, params)",
         "fresh_observation, fresh_state = self.reset_env(jax.random.key(0), params)",
-        ["test_env.py"],
+        ["tests/test_env.py"],
     ),
     "reset state cached in the fused rollout": (
         "vector.py", "fresh = jax.vmap(reset)(jax.random.split(fresh_key, portion), rows)",
@@ -103,50 +86,3 @@ FAULTS = {
     ),
 }  # fmt: skip
 """By name: module, code, what it becomes, tests that should catch it."""
-
-
-def main(argv=None) -> int:
-    """Try the faults; returns 1 if one was not caught."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", action="append", choices=FAULTS, help="this one (repeatable)")
-    parser.add_argument("--jobs", default="2", help="test processes")
-    arguments = parser.parse_args(argv)
-    missed = 0
-    for name in arguments.only or FAULTS:
-        caught = caught_by(*FAULTS[name], arguments.jobs)
-        missed += not caught
-        print(f"| {name} | {', '.join(caught) or 'NO TEST'} |", flush=True)
-    return 1 if missed else 0
-
-
-def caught_by(module, code, broken, tests, jobs) -> list[str]:
-    """Names of the first tests to fail when the code is broken."""
-    with tempfile.TemporaryDirectory() as scratch:
-        copy = Path(scratch) / "copy"
-        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", ".venv", "ckpt", "docs"))
-        path = copy / "attjax" / module
-        text = path.read_text()
-        assert text.count(code) == 1, f"{code!r} is {text.count(code)} times in {module}"
-        path.write_text(text.replace(code, broken))
-        done = subprocess.run(
-            [
-                sys.executable,
-                "-m",
-                "pytest",
-                "-q",
-                "-n",
-                jobs,
-                *(f"tests/{test}" for test in tests),
-            ],
-            cwd=copy,
-            env=os.environ | {"PYTHONPATH": str(copy)},
-            capture_output=True,
-            text=True,
-        )
-    assert done.returncode in (0, 1, 2), done.stdout + done.stderr
-    failed = re.findall(r"^(?:FAILED|ERROR) tests/\w+\.py::(\w+)", done.stdout, re.MULTILINE)
-    return list(dict.fromkeys(failed))
-
-
-if __name__ == "__main__":
-    sys.exit(main())
