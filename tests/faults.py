@@ -1,8 +1,23 @@
 """Deliberate faults that no rule of mutants.py makes, each with the tests that should see it."""
 
-PHYSICS = ["tests/test_truth.py", "tests/test_dynamics.py", "tests/test_quaternion.py", "tests/test_env.py"]
-LEARNING = ["tests/test_ppo.py", "tests/test_rollout.py", "tests/test_losses.py", "tests/test_vector.py"]
-RUNS = ["tests/test_checkpoint.py", "tests/test_run_folder.py", "tests/test_metrics.py", "tests/test_cli.py"]
+PHYSICS = [
+    "tests/test_truth.py",
+    "tests/test_dynamics.py",
+    "tests/test_quaternion.py",
+    "tests/test_env.py",
+]
+LEARNING = [
+    "tests/test_ppo.py",
+    "tests/test_rollout.py",
+    "tests/test_losses.py",
+    "tests/test_vector.py",
+]
+RUNS = [
+    "tests/test_checkpoint.py",
+    "tests/test_run_folder.py",
+    "tests/test_metrics.py",
+    "tests/test_cli.py",
+]
 FAULTS = {
     "sign of the gyroscopic term": (
         "dynamics.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, EnvState, observation
+from attjax import AttitudeEnv, EnvState, Spacecraft, observation
 from attjax.reward import logarithmic_reward
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
@@ -104,6 +104,39 @@ def test_observation_space_samples_lie_inside():
     assert jnp.all(jax.vmap(space.contains)(samples))
     assert not space.contains(2 * space.high)
     assert not space.contains(space.high[:3])
+
+
+def test_observation_space_holds_what_coasting_adds():
+    """A spin at the limit about the intermediate axis, kicked, over one step of 30 s.
+
+    It gains (I₁ + I₃)/(2 √(I₁I₃)) at I₂ = (I₁ + I₃)/2; for moments of 1 to 3 that is 2/√3.
+    """
+    spacecraft = Spacecraft(inertia=(1, 2, 3), torque_levels=(0.5,))
+    env = AttitudeEnv(7199, spacecraft=spacecraft)
+    params, limit = env.default_params, spacecraft.rate_limit
+    step = jax.jit(env.step_env)
+    space, highest = env.observation_space(params), 0.0
+    for steps in range(3000, 7200, 60):
+        w = jnp.array([0, limit * (1 - 1e-6), 0], float)
+        state = EnvState(jnp.array([0.0, 0, 0, 1]), w, jnp.array(0, jnp.int32))
+        observed, *_ = step(None, state, 1, params.replace(frameskip=jnp.array(steps)))
+        assert space.contains(observed)
+        highest = max(highest, float(jnp.linalg.norm(observed[8:])))
+    assert highest == pytest.approx(limit * 2 / 3**0.5, rel=0.02)
+    np.testing.assert_allclose(space.high[:4], 1)
+    np.testing.assert_allclose(space.high[4:8], space.high[8] / 2)
+    np.testing.assert_array_equal(space.low, -space.high)
+
+
+def test_a_reward_sees_the_impulse_of_a_torque_for_as_long_as_it_acts():
+    seen = []
+    for held, duration in ((False, 1 / 240), (True, 24 / 240)):
+        spacecraft = Spacecraft(torque_levels=(0.003,), torque_held=held)
+        env = AttitudeEnv(23, lambda transition: transition.impulse, spacecraft=spacecraft)
+        impulse = env.step_env(None, spinning(0.0), 4, env.default_params)[2]
+        np.testing.assert_allclose(impulse, [0, -0.003 * duration, 0], rtol=1e-6)
+        seen.append(float(impulse[1]))
+    assert seen[1] == pytest.approx(24 * seen[0])
 
 
 def test_reward_compares_with_the_quaternion_of_the_state_passed_in():

@@ -47,6 +47,21 @@ def test_multiscale_features_make_the_last_stretch_the_same_at_every_rate():
     np.testing.assert_allclose(slow[:-2], fast[:-2], rtol=1e-6)
 
 
+@pytest.mark.parametrize("period", [0.1, 0.025])
+def test_multiscale_features_written_out(x64, period):
+    """tanh(4ⁿ x) scale by scale, then q_s, the period in 0.1 s and its logarithm."""
+    context = CONTEXT.replace(control_period=jnp.array(period))
+    q, w = np.array([0.3, -2e-3, 4e-6, 0.9]), np.array([0.2, -1e-4, 3e-7])
+    x = np.concatenate([q[:3] * 0.05 / period, w])
+    expected = [np.tanh(4.0**n * component) for n in range(9) for component in x]
+    expected += [q[3], period / 0.1, np.log(period / 0.1)]
+    observed = jnp.concatenate([q, np.full(4, 7.0), w])  # q̇ is not looked at
+    np.testing.assert_allclose(networks.multiscale_features(observed, context), expected)
+    wrong = r"observation has shape \(10,\); it must be \(11,\)"
+    with pytest.raises(ValueError, match=wrong):
+        networks.multiscale_features(observed[:10], context)
+
+
 def test_mask_removes_exactly_the_actions_that_lead_beyond_the_limit(x64):
     rng = np.random.default_rng(0)
     context = ENV.context(ENV.default_params)

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from attjax import quaternion as quaternions
 from attjax.reward import Transition, logarithmic_reward, paper_reward, scalar_part_increased
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
@@ -114,3 +115,21 @@ def test_logarithmic_reward(period, truncated):
 
 def test_logarithmic_reward_punishes_overspeed():
     assert logarithmic_reward(transition(quaternion(1), quaternion(1), terminated=True)) == -50
+
+
+def test_the_edge_of_the_goal_is_inside():
+    """φ = 2 atan2(1, 1), a quarter turn, against a goal of as much."""
+    q = jnp.array([1.0, 0, 0, 1.0])
+    edge = transition(q, q)._replace(goal_angle=quaternions.error_angle(q))
+    assert paper_reward(edge) == pytest.approx(np.exp(-0.25 / 0.14) - 1 + 9)
+    assert paper_reward(edge._replace(truncated=jnp.array(True))) == 50
+
+
+def test_improvement_is_that_of_the_rotation_not_of_the_length():
+    """Near the goal and near the antipode; 9° against 10°, each longer or shorter."""
+    for sign in (1, -1):
+        near, far = sign * quaternion(9), sign * quaternion(10)
+        for scale in (0.9, 1.1):
+            closer = scalar_part_increased(jnp.array(scale * far), jnp.array(near))
+            farther = scalar_part_increased(jnp.array(scale * near), jnp.array(far))
+            assert (closer, farther) == ((True, False) if sign > 0 else (False, True))
