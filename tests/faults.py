@@ -1,22 +1,23 @@
 """Deliberate faults that no rule of mutants.py makes, each with the tests that should see it."""
 
 PHYSICS = [
-    "tests/test_truth.py",
-    "tests/test_dynamics.py",
-    "tests/test_quaternion.py",
-    "tests/test_env.py",
+    "test_truth.py",
+    "test_dynamics.py",
+    "test_quaternion.py",
+    "test_env.py",
 ]
 LEARNING = [
-    "tests/test_ppo.py",
-    "tests/test_rollout.py",
-    "tests/test_losses.py",
-    "tests/test_vector.py",
+    "test_ppo.py",
+    "test_rollout.py",
+    "test_losses.py",
+    "test_vector.py",
 ]
+DESCENT = ["test_descent.py", "test_losses.py", "test_rollout.py"]
 RUNS = [
-    "tests/test_checkpoint.py",
-    "tests/test_run_folder.py",
-    "tests/test_metrics.py",
-    "tests/test_cli.py",
+    "test_checkpoint.py",
+    "test_run_folder.py",
+    "test_metrics.py",
+    "test_cli.py",
 ]
 FAULTS = {
     "sign of the gyroscopic term": (
@@ -49,21 +50,21 @@ FAULTS = {
     "terminal reward added, not replacing": (
         "reward.py", "jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
         "reward + jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
-        ["tests/test_reward.py", "tests/test_env.py"],
+        ["test_reward.py", "test_env.py"],
     ),
     "time limit before overspeed": (
         "env.py", "truncated = ~terminated & (next_state.time", "truncated = (next_state.time",
-        ["tests/test_env.py"],
+        ["test_env.py"],
     ),
     "GAE bootstraps over a termination": (
-        "losses.py", "jnp.where(terminated, 0.0, next_values)", "next_values", ["tests/test_losses.py"],
+        "losses.py", "jnp.where(terminated, 0.0, next_values)", "next_values", ["test_losses.py"],
     ),
     "GAE runs over the end of an episode": (
         "losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)",
-        ["tests/test_losses.py"],
+        ["test_losses.py"],
     ),
     "clipped objective without the pessimistic bound": (
-        "losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", ["tests/test_losses.py"],
+        "losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", ["test_losses.py"],
     ),
     "annealing off by one": (
         "learner.py", "gradient_steps = settings.num_updates * settings.passes",
@@ -79,7 +80,7 @@ FAULTS = {
     "reset state cached": (
         "env.py", "fresh_observation, fresh_state = self.reset_env(key, params)",
         "fresh_observation, fresh_state = self.reset_env(jax.random.key(0), params)",
-        ["tests/test_env.py"],
+        ["test_env.py"],
     ),
     "reset state cached in the fused rollout": (
         "vector.py", "fresh = jax.vmap(reset)(jax.random.split(fresh_key, portion), rows)",
@@ -88,6 +89,61 @@ FAULTS = {
     "devices draw the same numbers": (
         "rollout.py", "jax.random.fold_in(device_key, jax.lax.axis_index(vector.AXIS))",
         "jax.random.fold_in(device_key, 0)", LEARNING,
+    ),
+    "closest angle is the last": (
+        "evaluation.py", "closest_angle=jnp.where(closer, angle, so_far.closest_angle)",
+        "closest_angle=angle", ["test_evaluation.py"],
+    ),
+    "closest rate is the last": (
+        "evaluation.py", "closest_rate=jnp.where(closer, rate, so_far.closest_rate)",
+        "closest_rate=rate", ["test_evaluation.py"],
+    ),
+    "impulse of a held torque is that of a pulse, in evaluation": (
+        "evaluation.py", "context.torque_duration", "(1 / 240)", ["test_evaluation.py"],
+    ),
+    "impulse of a held torque is that of a pulse, for a reward": (
+        "env.py", "self.context(params).torque_duration,", "INTEGRATION_STEP,",
+        ["test_env.py"],
+    ),
+    "sign in TABLE_5": (
+        "evaluation.py", '"slew2": (0.44228, -0.44228', '"slew2": (0.44228, 0.44228',
+        ["test_evaluation.py"],
+    ),
+    "factor of the time-optimal reference": (
+        "evaluation.py", "return 2 * jnp.sqrt(jnp.sum(momentum)",
+        "return 3 * jnp.sqrt(jnp.sum(momentum)", ["test_evaluation.py"],
+    ),
+    "reward_scale ignored": (
+        "rollout.py", "reward * setup.settings.reward_scale", "reward", ["test_rollout.py"],
+    ),
+    "max_gradient_norm ignored": (
+        "learner.py", "if settings.max_gradient_norm > 0:", "if False:", DESCENT,
+    ),
+    "normalize_advantage ignored: always": (
+        "descent.py", "if settings.normalize_advantage:", "if True:", DESCENT,
+    ),
+    "normalize_advantage ignored: never": (
+        "descent.py", "if settings.normalize_advantage:", "if False:", DESCENT,
+    ),
+    "same shuffle in each pass": (
+        "descent.py", "jax.random.split(pass_key, settings.passes)",
+        "jnp.stack([pass_key] * settings.passes)", DESCENT,
+    ),
+    "same shuffle on each device": (
+        "descent.py", "jax.random.fold_in(pass_key, jax.lax.axis_index(vector.AXIS))",
+        "jax.random.fold_in(pass_key, 0)", DESCENT,
+    ),
+    "approximate KL without its ratio": (
+        "losses.py", "jnp.mean(ratio - 1 - log_ratio)", "jnp.mean(-log_ratio)",
+        ["test_losses.py"],
+    ),
+    "multi-scale features without the period": (
+        "networks.py", "10 * control_period, jnp.log(10 * control_period)",
+        "0 * control_period, 0 * control_period", ["test_networks.py"],
+    ),
+    "observation bound without coasting": (
+        "env.py", "(params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))",
+        "(params.rate_limit + kick)", ["test_env.py"],
     ),
     "optimizer not restored": (
         "checkpoint.py", "    return restored.replace(key=",

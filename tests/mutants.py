@@ -36,23 +36,38 @@ ROOT = Path(__file__).resolve().parents[1]
 TESTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mutants"]
 EQUIVALENT = tomllib.loads((ROOT / "tests/equivalent_mutants.toml").read_text())
 OPERATORS = [
-    f"core/{name}"
-    for name in """
-    NumberReplacer AddNot ZeroIterationForLoop
-    ReplaceTrueWithFalse ReplaceFalseWithTrue ReplaceAndWithOr ReplaceOrWithAnd
-    ReplaceUnaryOperator_Delete_USub ReplaceUnaryOperator_Delete_Invert
-    ReplaceUnaryOperator_Delete_Not
-    ReplaceBinaryOperator_Add_Sub ReplaceBinaryOperator_Sub_Add ReplaceBinaryOperator_Mul_Div
-    ReplaceBinaryOperator_Mul_Add ReplaceBinaryOperator_Div_Mul ReplaceBinaryOperator_Pow_Mul
-    ReplaceBinaryOperator_FloorDiv_Mul ReplaceBinaryOperator_Mod_Mul
-    ReplaceBinaryOperator_BitAnd_BitOr ReplaceBinaryOperator_BitOr_BitAnd
-    ReplaceComparisonOperator_Eq_NotEq ReplaceComparisonOperator_NotEq_Eq
-    ReplaceComparisonOperator_Lt_LtE ReplaceComparisonOperator_Lt_GtE
-    ReplaceComparisonOperator_LtE_Lt ReplaceComparisonOperator_LtE_Gt
-    ReplaceComparisonOperator_Gt_GtE ReplaceComparisonOperator_Gt_LtE
-    ReplaceComparisonOperator_GtE_Gt ReplaceComparisonOperator_GtE_Lt
-    ReplaceComparisonOperator_Is_IsNot ReplaceComparisonOperator_IsNot_Is
-    """.split()
+    "NumberReplacer",
+    "AddNot",
+    "ZeroIterationForLoop",
+    "ReplaceTrueWithFalse",
+    "ReplaceFalseWithTrue",
+    "ReplaceAndWithOr",
+    "ReplaceOrWithAnd",
+    "ReplaceUnaryOperator_Delete_USub",
+    "ReplaceUnaryOperator_Delete_Invert",
+    "ReplaceUnaryOperator_Delete_Not",
+    "ReplaceBinaryOperator_Add_Sub",
+    "ReplaceBinaryOperator_Sub_Add",
+    "ReplaceBinaryOperator_Mul_Div",
+    "ReplaceBinaryOperator_Mul_Add",
+    "ReplaceBinaryOperator_Div_Mul",
+    "ReplaceBinaryOperator_Pow_Mul",
+    "ReplaceBinaryOperator_FloorDiv_Mul",
+    "ReplaceBinaryOperator_Mod_Mul",
+    "ReplaceBinaryOperator_BitAnd_BitOr",
+    "ReplaceBinaryOperator_BitOr_BitAnd",
+    "ReplaceComparisonOperator_Eq_NotEq",
+    "ReplaceComparisonOperator_NotEq_Eq",
+    "ReplaceComparisonOperator_Lt_LtE",
+    "ReplaceComparisonOperator_Lt_GtE",
+    "ReplaceComparisonOperator_LtE_Lt",
+    "ReplaceComparisonOperator_LtE_Gt",
+    "ReplaceComparisonOperator_Gt_GtE",
+    "ReplaceComparisonOperator_Gt_LtE",
+    "ReplaceComparisonOperator_GtE_Gt",
+    "ReplaceComparisonOperator_GtE_Lt",
+    "ReplaceComparisonOperator_Is_IsNot",
+    "ReplaceComparisonOperator_IsNot_Is",
 ]
 """One or two of each kind: cosmic-ray's 160 make the same point with every other operator."""
 
@@ -60,10 +75,21 @@ SWAPS = "minimum maximum|min max|any all|sin cos|zeros ones|zeros_like ones_like
 SWAPS = dict(pair.split() for pair in SWAPS.split("|"))
 SWAPS |= {b: a for a, b in SWAPS.items()}
 
-PRELOADED = """
-chex flax.linen hypothesis jax jax.test_util numpy optax orbax.checkpoint pytest rich.live
-scipy.integrate scipy.spatial scipy.special
-""".split()
+PRELOADED = [
+    "chex",
+    "flax.linen",
+    "hypothesis",
+    "jax",
+    "jax.test_util",
+    "numpy",
+    "optax",
+    "orbax.checkpoint",
+    "pytest",
+    "rich.live",
+    "scipy.integrate",
+    "scipy.spatial",
+    "scipy.special",
+]
 """What tests import and no change touches; none of it starts JAX's threads."""
 
 TIME_LIMIT = 300
@@ -91,6 +117,7 @@ def main(argv=None) -> int:
     """Try the changes; returns 1 if one was not seen."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--modules", nargs="+", choices=[*TESTS, "faults"], help="of these only")
+    parser.add_argument("--only", default="", help="those whose name or line has this in it")
     parser.add_argument("--jobs", type=int, default=2, help="test processes")
     parser.add_argument(
         "--log", type=Path, help="JSON lines; what an earlier run there saw is not tried again"
@@ -98,6 +125,7 @@ def main(argv=None) -> int:
     arguments = parser.parse_args(argv)
     chosen = arguments.modules or [*TESTS, "faults"]
     mutants = [x for name in chosen for x in (faults() if name == "faults" else changes(name))]
+    mutants = [x for x in mutants if arguments.only in f"{x.name} {x.line}"]
     seen = {}
     if arguments.log and arguments.log.exists():
         results = map(json.loads, arguments.log.read_text().splitlines())
@@ -133,9 +161,12 @@ def key(mutant) -> tuple[str, str, str]:
 
 
 def is_equivalent(mutant) -> bool:
-    """Whether equivalent_mutants.toml lists it."""
-    listed = EQUIVALENT.get(mutant.module, [])
-    return any((x["line"], x["becomes"]) == (mutant.line, mutant.becomes) for x in listed)
+    """Whether equivalent_mutants.toml lists it, or the part of the line that was changed."""
+    return any(
+        mutant.becomes.count(x["becomes"]) == 1
+        and mutant.becomes.replace(x["becomes"], x["line"]) == mutant.line
+        for x in EQUIVALENT.get(mutant.module, [])
+    )
 
 
 def faults() -> list[Mutant]:
@@ -145,6 +176,7 @@ def faults() -> list[Mutant]:
         text = (ROOT / "attjax" / module).read_text()
         assert text.count(code) == 1, f"{code!r} is {text.count(code)} times in {module}"
         text = text.replace(code, broken)
+        tests = [f"tests/{test}" for test in tests]
         found.append(Mutant(module.removesuffix(".py"), name, text, name, broken, tests))
     return found
 
@@ -152,7 +184,7 @@ def faults() -> list[Mutant]:
 def changes(module) -> list[Mutant]:
     """What the operators make of a module; each changed text once."""
     text = (ROOT / f"attjax/{module}.py").read_text()
-    operators = {name: cosmic_ray.plugins.get_operator(name)() for name in OPERATORS}
+    operators = {name: cosmic_ray.plugins.get_operator(f"core/{name}")() for name in OPERATORS}
     found = {}
     for name, operator in (operators | {"SwapNames": SwapNames()}).items():
         occurrence = 0
