@@ -19,6 +19,7 @@ import importlib
 import json
 import os
 import re
+import resource
 import shutil
 import signal
 import sys
@@ -93,7 +94,7 @@ PRELOADED = [
 """What tests import and no change touches; none of it starts JAX's threads."""
 
 TIME_LIMIT = 300
-"""Seconds after which a change is taken to be seen: it hangs."""
+"""Seconds of processor time after which a change is taken to be seen: it hangs."""
 
 Mutant = collections.namedtuple("Mutant", "module name source line becomes tests")
 
@@ -236,7 +237,8 @@ def start(copy, tests) -> int:
     process = os.fork()
     if process:
         return process
-    signal.alarm(TIME_LIMIT)
+    resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT))
+    signal.alarm(10 * TIME_LIMIT)  # for one that waits
     sys.dont_write_bytecode = True
     sys.path.remove(str(ROOT / "tests"))
     del sys.modules["faults"]
@@ -255,8 +257,8 @@ def start(copy, tests) -> int:
 def outcome(status, output) -> tuple[str, str]:
     """What became of a mutant, and the first test that failed."""
     if os.WIFSIGNALED(status):
-        signalled = os.WTERMSIG(status)
-        return ("hung" if signalled == signal.SIGALRM else "killed"), f"signal {signalled}"
+        name = signal.Signals(os.WTERMSIG(status)).name
+        return ("hung" if name in ("SIGALRM", "SIGXCPU", "SIGKILL") else "killed"), name
     code = os.WEXITSTATUS(status)
     failed = re.findall(r"^FAILED (\S+)", output, re.MULTILINE)
     if code == 0:
