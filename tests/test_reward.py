@@ -133,3 +133,9 @@ def test_improvement_is_that_of_the_rotation_not_of_the_length():
             closer = scalar_part_increased(jnp.array(scale * far), jnp.array(near))
             farther = scalar_part_increased(jnp.array(scale * near), jnp.array(far))
             assert (closer, farther) == ((True, False) if sign > 0 else (False, True))
+
+
+@pytest.mark.parametrize("degrees", [10, 90, 180, 270, 350])
+def test_no_attitude_improves_on_itself(degrees):
+    q = jnp.array(quaternion(degrees))
+    assert not scalar_part_increased(q, q)
