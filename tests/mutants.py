@@ -118,7 +118,7 @@ def main(argv=None) -> int:
     """Try the changes; returns 1 if one was not seen."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--modules", nargs="+", choices=[*TESTS, "faults"], help="of these only")
-    parser.add_argument("--only", default="", help="those whose name or line has this in it")
+    parser.add_argument("--only", default="", help="a pattern of names or lines")
     parser.add_argument("--jobs", type=int, default=2, help="test processes")
     parser.add_argument(
         "--log", type=Path, help="JSON lines; what an earlier run there saw is not tried again"
@@ -126,7 +126,7 @@ def main(argv=None) -> int:
     arguments = parser.parse_args(argv)
     chosen = arguments.modules or [*TESTS, "faults"]
     mutants = [x for name in chosen for x in (faults() if name == "faults" else changes(name))]
-    mutants = [x for x in mutants if arguments.only in f"{x.name} {x.line}"]
+    mutants = [x for x in mutants if re.search(arguments.only, f"{x.name} {x.line}")]
     seen = {}
     if arguments.log and arguments.log.exists():
         results = map(json.loads, arguments.log.read_text().splitlines())

@@ -38,40 +38,6 @@ def evaluate(controller, env, params, seed, episodes):
     return conditions | evaluation.statistics(flown, env, params)
 
 
-def test_statistics_agree_with_a_plain_loop():
-    """One episode at a time, in Python, from the definitions in the contract."""
-    episodes, steps = 6, 120
-    params = with_steps(ENV, steps)
-    params = params.replace(goal_angle=jnp.deg2rad(25.0))  # so that some settle
-    flown = evaluation.fly(
-        jax.tree_util.Partial(brake_then_point), ENV, params, jax.random.key(5), episodes
-    )
-    step = jax.jit(ENV.step_env)
-    for i, key in enumerate(jax.random.split(jax.random.key(5), episodes)):
-        observation, state = ENV.reset(key, params)
-        angles, rates, score, impulse = [], [], 0.0, 0.0
-        for _ in range(steps):
-            action = brake_then_point(observation, ENV.context(params))
-            observation, state, reward, terminated, _ = step(key, state, action, params)
-            angles.append(float(quaternions.error_angle(state.quaternion)))
-            rates.append(float(np.linalg.norm(state.angular_velocity)))
-            score += float(reward)
-            impulse += float(np.linalg.norm(params.torque_table[action])) / 240
-            if terminated:
-                break
-        closest = int(np.argmin(angles))
-        outside = [n + 1 for n, angle in enumerate(angles) if angle > float(params.goal_angle)]
-        assert float(flown.closest_angle[i]) == pytest.approx(angles[closest], abs=1e-5)
-        assert float(flown.closest_rate[i]) == pytest.approx(rates[closest], abs=1e-5)
-        assert float(flown.terminal_angle[i]) == pytest.approx(angles[-1], abs=1e-5)
-        assert float(flown.terminal_rate[i]) == pytest.approx(rates[-1], abs=1e-5)
-        assert float(flown.score[i]) == pytest.approx(score, rel=1e-4)
-        assert float(flown.impulse[i]) == pytest.approx(impulse, rel=1e-4)
-        assert int(flown.last_outside[i]) == (outside[-1] if outside else 0)
-        assert bool(flown.overspeed[i]) == bool(terminated)
-    assert 0 < int(flown.last_outside.min()) < steps
-
-
 def test_coasting_never_succeeds():
     result = evaluate(jax.tree_util.Partial(coast), ENV, with_steps(ENV, 20), seed=0, episodes=50)
     assert result["success_rate"] == result["overspeed_rate"] == 0
@@ -248,3 +214,37 @@ def test_conditions_and_settling_times_worked_by_hand():
 def test_no_episodes_are_refused():
     with pytest.raises(ValueError, match="episodes is 0; it must be at least 1"):
         evaluation.fly(jax.tree_util.Partial(coast), ENV, with_steps(ENV, 1), jax.random.key(0), 0)
+
+
+def test_statistics_agree_with_a_plain_loop():
+    """One episode at a time, in Python, from the definitions in the contract."""
+    episodes, steps = 6, 120
+    params = with_steps(ENV, steps)
+    params = params.replace(goal_angle=jnp.deg2rad(25.0))  # so that some settle
+    flown = evaluation.fly(
+        jax.tree_util.Partial(brake_then_point), ENV, params, jax.random.key(5), episodes
+    )
+    step = jax.jit(ENV.step_env)
+    for i, key in enumerate(jax.random.split(jax.random.key(5), episodes)):
+        observation, state = ENV.reset(key, params)
+        angles, rates, score, impulse = [], [], 0.0, 0.0
+        for _ in range(steps):
+            action = brake_then_point(observation, ENV.context(params))
+            observation, state, reward, terminated, _ = step(key, state, action, params)
+            angles.append(float(quaternions.error_angle(state.quaternion)))
+            rates.append(float(np.linalg.norm(state.angular_velocity)))
+            score += float(reward)
+            impulse += float(np.linalg.norm(params.torque_table[action])) / 240
+            if terminated:
+                break
+        closest = int(np.argmin(angles))
+        outside = [n + 1 for n, angle in enumerate(angles) if angle > float(params.goal_angle)]
+        assert float(flown.closest_angle[i]) == pytest.approx(angles[closest], abs=1e-5)
+        assert float(flown.closest_rate[i]) == pytest.approx(rates[closest], abs=1e-5)
+        assert float(flown.terminal_angle[i]) == pytest.approx(angles[-1], abs=1e-5)
+        assert float(flown.terminal_rate[i]) == pytest.approx(rates[-1], abs=1e-5)
+        assert float(flown.score[i]) == pytest.approx(score, rel=1e-4)
+        assert float(flown.impulse[i]) == pytest.approx(impulse, rel=1e-4)
+        assert int(flown.last_outside[i]) == (outside[-1] if outside else 0)
+        assert bool(flown.overspeed[i]) == bool(terminated)
+    assert 0 < int(flown.last_outside.min()) < steps
