@@ -28,6 +28,48 @@ def test_sizes_are_table_3():
         assert kernels == [(11, 400), (400, 300), (300, outputs)]
 
 
+def test_layers_begin_orthogonal_and_without_bias(x64):
+    """√2 times orthogonal before a ReLU; 0.01 times for logits, so that all actions are likely."""
+    params = parameters(Policy(hidden_sizes=(8, 5), num_actions=3))
+    for name, last in (("policy", 0.01), ("value", 1.0)):
+        layers = params[name]["params"]
+        for layer, scale in zip(layers.values(), (2**0.5, 2**0.5, last)):
+            singular = np.linalg.svd(layer["kernel"], compute_uv=False)
+            np.testing.assert_allclose(singular, scale)
+            assert not layer["bias"].any()
+        assert len(layers) == 3
+
+
+def test_the_papers_policy_sees_the_observation_and_masks_nothing():
+    observed = observe([0.6, 0.5, -0.4], (0.1, -0.7, 0.5, 0.5))
+    inputs = Policy().encode(observed, CONTEXT)
+    np.testing.assert_array_equal(inputs.features, observed)
+    assert inputs.allowed.shape == (19,) and inputs.allowed.all()
+    assert not Policy(rate_margin=1e-3).encode(observed, CONTEXT).allowed.all()
+
+
+def test_values_and_masked_probabilities_written_out(x64):
+    """With one hidden layer, in NumPy; a masked action has no part of the sum."""
+    policy = Policy(hidden_sizes=(6,), num_actions=4)
+    params = parameters(policy)
+    x = np.random.default_rng(3).normal(size=(5, 11))
+    allowed = np.array([[1, 0, 1, 1], [1, 1, 1, 1], [0, 0, 1, 0], [1, 1, 0, 0], [0, 1, 0, 1]], bool)
+
+    def network(name):
+        first, last = (params[name]["params"][f"Dense_{i}"] for i in range(2))
+        hidden = np.maximum(x @ np.asarray(first["kernel"]) + np.asarray(first["bias"]), 0)
+        return hidden @ np.asarray(last["kernel"]) + np.asarray(last["bias"])
+
+    np.testing.assert_allclose(policy.value(params, x), network("value")[:, 0])
+    inputs = Inputs(jnp.array(x), jnp.array(allowed))
+    weights = np.exp(network("policy")) * allowed
+    expected = weights / weights.sum(axis=1, keepdims=True)
+    probabilities = np.exp(policy.log_probabilities(params, inputs))
+    np.testing.assert_allclose(probabilities, expected.T, atol=1e-15)
+    for row, most in enumerate(expected.argmax(axis=1)):
+        assert np.asarray(policy.logits(params, inputs))[:, row].argmax() == most
+
+
 def test_multiscale_features_resolve_every_decade():
     """A change of 1 % at any distance from the goal moves some feature by 1e-3 or more."""
     for magnitude in 10.0 ** np.arange(-6, 0):
