@@ -14,7 +14,6 @@ Example:
 
 import argparse
 import collections
-import difflib
 import importlib
 import json
 import os
@@ -37,39 +36,22 @@ ROOT = Path(__file__).resolve().parents[1]
 TESTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mutants"]
 EQUIVALENT = tomllib.loads((ROOT / "tests/equivalent_mutants.toml").read_text())
 OPERATORS = [
-    "NumberReplacer",
-    "AddNot",
-    "ZeroIterationForLoop",
-    "ReplaceTrueWithFalse",
-    "ReplaceFalseWithTrue",
-    "ReplaceAndWithOr",
-    "ReplaceOrWithAnd",
-    "ReplaceUnaryOperator_Delete_USub",
-    "ReplaceUnaryOperator_Delete_Invert",
-    "ReplaceUnaryOperator_Delete_Not",
-    "ReplaceBinaryOperator_Add_Sub",
-    "ReplaceBinaryOperator_Sub_Add",
-    "ReplaceBinaryOperator_Mul_Div",
-    "ReplaceBinaryOperator_Mul_Add",
-    "ReplaceBinaryOperator_Div_Mul",
-    "ReplaceBinaryOperator_Pow_Mul",
-    "ReplaceBinaryOperator_FloorDiv_Mul",
-    "ReplaceBinaryOperator_Mod_Mul",
-    "ReplaceBinaryOperator_BitAnd_BitOr",
-    "ReplaceBinaryOperator_BitOr_BitAnd",
-    "ReplaceComparisonOperator_Eq_NotEq",
-    "ReplaceComparisonOperator_NotEq_Eq",
-    "ReplaceComparisonOperator_Lt_LtE",
-    "ReplaceComparisonOperator_Lt_GtE",
-    "ReplaceComparisonOperator_LtE_Lt",
-    "ReplaceComparisonOperator_LtE_Gt",
-    "ReplaceComparisonOperator_Gt_GtE",
-    "ReplaceComparisonOperator_Gt_LtE",
-    "ReplaceComparisonOperator_GtE_Gt",
-    "ReplaceComparisonOperator_GtE_Lt",
-    "ReplaceComparisonOperator_Is_IsNot",
+    "NumberReplacer", "AddNot", "ZeroIterationForLoop", "ReplaceTrueWithFalse",
+    "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd",
+    "ReplaceUnaryOperator_Delete_USub", "ReplaceUnaryOperator_Delete_Invert",
+    "ReplaceUnaryOperator_Delete_Not", "ReplaceBinaryOperator_Add_Sub",
+    "ReplaceBinaryOperator_Sub_Add", "ReplaceBinaryOperator_Mul_Div",
+    "ReplaceBinaryOperator_Mul_Add", "ReplaceBinaryOperator_Div_Mul",
+    "ReplaceBinaryOperator_Pow_Mul", "ReplaceBinaryOperator_FloorDiv_Mul",
+    "ReplaceBinaryOperator_Mod_Mul", "ReplaceBinaryOperator_BitAnd_BitOr",
+    "ReplaceBinaryOperator_BitOr_BitAnd", "ReplaceComparisonOperator_Eq_NotEq",
+    "ReplaceComparisonOperator_NotEq_Eq", "ReplaceComparisonOperator_Lt_LtE",
+    "ReplaceComparisonOperator_Lt_GtE", "ReplaceComparisonOperator_LtE_Lt",
+    "ReplaceComparisonOperator_LtE_Gt", "ReplaceComparisonOperator_Gt_GtE",
+    "ReplaceComparisonOperator_Gt_LtE", "ReplaceComparisonOperator_GtE_Gt",
+    "ReplaceComparisonOperator_GtE_Lt", "ReplaceComparisonOperator_Is_IsNot",
     "ReplaceComparisonOperator_IsNot_Is",
-]
+]  # fmt: skip
 """One or two of each kind: cosmic-ray's 160 make the same point with every other operator."""
 
 SWAPS = "minimum maximum|min max|any all|sin cos|zeros ones|zeros_like ones_like|mean sum"
@@ -77,20 +59,9 @@ SWAPS = dict(pair.split() for pair in SWAPS.split("|"))
 SWAPS |= {b: a for a, b in SWAPS.items()}
 
 PRELOADED = [
-    "chex",
-    "flax.linen",
-    "hypothesis",
-    "jax",
-    "jax.test_util",
-    "numpy",
-    "optax",
-    "orbax.checkpoint",
-    "pytest",
-    "rich.live",
-    "scipy.integrate",
-    "scipy.spatial",
-    "scipy.special",
-]
+    "chex", "flax.linen", "hypothesis", "jax", "jax.test_util", "numpy", "optax",
+    "orbax.checkpoint", "pytest", "rich.live", "scipy.integrate", "scipy.spatial", "scipy.special",
+]  # fmt: skip
 """What tests import and no change touches; none of it starts JAX's threads."""
 
 TIME_LIMIT = 300
@@ -114,8 +85,8 @@ class SwapNames(Operator):
         return ()
 
 
-def main(argv=None) -> int:
-    """Try the changes; returns 1 if one was not seen."""
+def options(argv) -> argparse.Namespace:
+    """What the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--modules", nargs="+", choices=[*TESTS, "faults"], help="of these only")
     parser.add_argument("--only", default="", help="a pattern of names or lines")
@@ -123,37 +94,48 @@ def main(argv=None) -> int:
     parser.add_argument(
         "--log", type=Path, help="JSON lines; what an earlier run there saw is not tried again"
     )
-    arguments = parser.parse_args(argv)
-    chosen = arguments.modules or [*TESTS, "faults"]
-    mutants = [x for name in chosen for x in (faults() if name == "faults" else changes(name))]
-    mutants = [x for x in mutants if re.search(arguments.only, f"{x.name} {x.line}")]
-    seen = {}
-    if arguments.log and arguments.log.exists():
-        results = map(json.loads, arguments.log.read_text().splitlines())
-        seen = {tuple(x["key"]): x["outcome"] for x in results if x["outcome"] != "survived"}
+    return parser.parse_args(argv)
+
+
+def main(argv=None) -> int:
+    """Try the changes; returns 1 if one was not seen."""
+    chosen = options(argv)
+    modules = chosen.modules or [*TESTS, "faults"]
+    mutants = [x for name in modules for x in (faults() if name == "faults" else changes(name))]
+    mutants = [x for x in mutants if re.search(chosen.only, f"{x.name} {x.line}")]
+    known = {key(x): "equivalent" for x in mutants if is_equivalent(x)}
+    if chosen.log and chosen.log.exists():
+        results = map(json.loads, chosen.log.read_text().splitlines())
+        known |= {tuple(x["key"]): x["outcome"] for x in results if x["outcome"] != "survived"}
     for name in PRELOADED:
         importlib.import_module(name)
-    outcomes = collections.defaultdict(collections.Counter)
-    todo = []
-    for mutant in mutants:
-        outcome = "equivalent" if is_equivalent(mutant) else seen.get(key(mutant))
-        if outcome is None:
-            todo.append(mutant)
-        else:
-            outcomes[mutant.module][outcome] += 1
-    for mutant, outcome, caught_by in run(todo, arguments.jobs):
-        outcomes[mutant.module][outcome] += 1
+    todo = [x for x in mutants if key(x) not in known]
+    check_tests(todo)
+    for mutant, outcome, caught_by in run(todo, chosen.jobs):
+        known[key(mutant)] = outcome
         print(f"{outcome:9} {mutant.module}: {mutant.line}  ->  {mutant.becomes}  {caught_by}")
         sys.stdout.flush()
-        if arguments.log:
+        if chosen.log:
             entry = {"key": key(mutant), "outcome": outcome, "caught_by": caught_by}
-            with arguments.log.open("a") as log:
+            with chosen.log.open("a") as log:
                 log.write(json.dumps(entry) + "\n")
     kinds = ("killed", "hung", "broken", "equivalent", "survived")
     print("| module | mutants |", " | ".join(kinds), "|")
-    for module, counts in outcomes.items():
-        print("|", module, "|", counts.total(), "|", " | ".join(str(counts[k]) for k in kinds), "|")
-    return 1 if any(counts["survived"] for counts in outcomes.values()) else 0
+    counts = collections.Counter((x.module, known[key(x)]) for x in mutants)
+    for module in dict.fromkeys(x.module for x in mutants):
+        numbers = [counts[module, kind] for kind in kinds]
+        print("|", module, "|", sum(numbers), "|", " | ".join(map(str, numbers)), "|")
+    return 1 if "survived" in known.values() else 0
+
+
+def check_tests(mutants) -> None:
+    """End the program if the tests fail on the code as it is, since they would on any change."""
+    for module, tests in {x.module: x.tests for x in mutants}.items():
+        text = (ROOT / f"attjax/{module}.py").read_text()
+        unchanged = Mutant(module, "", text, "", "", tests)
+        for _, outcome, failed in run([unchanged], 1):
+            if outcome != "survived":
+                sys.exit(f"the tests of {module} fail on the code as it is: {failed}")
 
 
 def key(mutant) -> tuple[str, str, str]:
@@ -200,9 +182,9 @@ def changes(module) -> list[Mutant]:
 
 def difference(before, after) -> tuple[str, str]:
     """The lines that were changed, and what they became."""
-    lines = list(difflib.ndiff(before.splitlines(), after.splitlines()))
-    pick = [" ".join(x[2:].strip() for x in lines if x.startswith(sign)) for sign in ("- ", "+ ")]
-    return tuple(pick)
+    pairs = zip(before.splitlines(), after.splitlines())
+    changed = [(a.strip(), b.strip()) for a, b in pairs if a != b]
+    return tuple(" ".join(lines) for lines in zip(*changed))
 
 
 def run(mutants, jobs):
