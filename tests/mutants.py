@@ -182,9 +182,11 @@ def changes(module) -> list[Mutant]:
 
 def difference(before, after) -> tuple[str, str]:
     """The lines that were changed, and what they became."""
-    pairs = zip(before.splitlines(), after.splitlines())
-    changed = [(a.strip(), b.strip()) for a, b in pairs if a != b]
-    return tuple(" ".join(lines) for lines in zip(*changed))
+    both = [text.splitlines() for text in (before, after)]
+    head = len(os.path.commonprefix(both))
+    both = [lines[head:] for lines in both]
+    tail = len(os.path.commonprefix([lines[::-1] for lines in both]))
+    return tuple(" ".join(map(str.strip, lines[: len(lines) - tail])) for lines in both)
 
 
 def run(mutants, jobs):
