@@ -182,11 +182,12 @@ def changes(module) -> list[Mutant]:
 
 def difference(before, after) -> tuple[str, str]:
     """The lines that were changed, and what they became."""
-    both = [text.splitlines() for text in (before, after)]
-    head = len(os.path.commonprefix(both))
-    both = [lines[head:] for lines in both]
-    tail = len(os.path.commonprefix([lines[::-1] for lines in both]))
-    return tuple(" ".join(map(str.strip, lines[: len(lines) - tail])) for lines in both)
+    old, new = before.splitlines(), after.splitlines()
+    while old and new and old[0] == new[0]:
+        del old[0], new[0]
+    while old and new and old[-1] == new[-1]:
+        del old[-1], new[-1]
+    return " ".join(map(str.strip, old)), " ".join(map(str.strip, new))
 
 
 def run(mutants, jobs):
