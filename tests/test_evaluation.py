@@ -211,7 +211,11 @@ def test_conditions_and_settling_times_worked_by_hand():
     assert result["episode_return"]["mean"] == 2.5 and result["impulse_N_m_s"]["max"] == 4
 
 
-def test_no_episodes_are_refused():
+def test_one_episode_is_flown_and_none_is_refused():
+    one = evaluation.fly(
+        jax.tree_util.Partial(coast), ENV, with_steps(ENV, 1), jax.random.key(0), 1
+    )
+    assert one.score.shape == (1,)
     with pytest.raises(ValueError, match="episodes is 0; it must be at least 1"):
         evaluation.fly(jax.tree_util.Partial(coast), ENV, with_steps(ENV, 1), jax.random.key(0), 0)
 
