@@ -7,7 +7,7 @@ EXTRAS ?= test
 CHECKPOINT ?= ckpt
 BIN := $(VENV)/bin
 
-.PHONY: train test test-all test-peers eval lint docs setup
+.PHONY: train test test-all test-peers mutants eval lint docs setup
 
 train: setup
 	$(BIN)/python train.py --num-envs 2048 --checkpoint $(CHECKPOINT) $(ARGS)
@@ -42,6 +42,10 @@ $(VENV)-gym/installed $(VENV)-rejax/installed: pyproject.toml
 	$(PYTHON) -m venv $(@D)
 	$(@D)/bin/python -m pip install --quiet --disable-pip-version-check --editable $(PACKAGES)
 	touch $@
+
+# The tests are tried on broken code; ARGS='--modules losses reward' for a part of it.
+mutants: $(VENV)/installed-mutation
+	$(BIN)/python tests/mutants.py $(ARGS)
 
 lint: setup
 	$(BIN)/ruff check .

@@ -50,7 +50,7 @@ def _random_description(rng, kind, form, frameskip, steps):
     least = 10 ** rng.uniform(-2.9, 0)
     shortest = max(least, 1 - least)  # no rigid body has a middle moment below it
     middle = rng.choice([shortest, rng.uniform(shortest, 1), 1])
-    moments = rng.permutation([least, middle, 1]) * 10 ** rng.uniform(-4, 1)
+    moments = rng.permutation([least, middle, 1]) * 10 ** rng.uniform(-2, 1)
     inertia = moments
     if form == "tensor":
         turned = Rotation.random(random_state=rng.integers(2**31)).as_matrix()

@@ -24,7 +24,7 @@ from attjax import run_folder
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 SHORT = [flag for flag in TINY if not flag.startswith("--frameskips")]
 PEERS = ("torch", "stable-baselines3", "gymnax", "rejax", "tensorboard")
-CAMPAIGNS = ("tests/exported.py", "tests/kills.py", "tests/faults.py")
+CAMPAIGNS = ("tests/exported.py", "tests/kills.py", "tests/mutants.py")
 NO_FLAG = "--no-flag-of-any-script"
 
 

@@ -1,25 +1,24 @@
-"""Breaks the code on purpose, a fault at a time in a copy, and tells which test catches it first.
+"""Deliberate faults that no rule of mutants.py makes, each with the tests that should see it."""
 
-A fault that no test catches is an error.
-
-Example:
-    python tests/faults.py
-    python tests/faults.py --only "key reused"
-"""
-
-import argparse
-import os
-import re
-import shutil
-import subprocess
-import sys
-import tempfile
-from pathlib import Path
-
-ROOT = Path(__file__).resolve().parents[1]
-PHYSICS = ["test_truth.py", "test_dynamics.py", "test_quaternion.py", "test_env.py"]
-LEARNING = ["test_ppo.py", "test_rollout.py", "test_losses.py", "test_vector.py"]
-RUNS = ["test_checkpoint.py", "test_run_folder.py", "test_metrics.py", "test_cli.py"]
+PHYSICS = [
+    "test_truth.py",
+    "test_dynamics.py",
+    "test_quaternion.py",
+    "test_env.py",
+]
+LEARNING = [
+    "test_ppo.py",
+    "test_rollout.py",
+    "test_losses.py",
+    "test_vector.py",
+]
+DESCENT = ["test_descent.py", "test_losses.py", "test_rollout.py"]
+RUNS = [
+    "test_checkpoint.py",
+    "test_run_folder.py",
+    "test_metrics.py",
+    "test_cli.py",
+]
 FAULTS = {
     "sign of the gyroscopic term": (
         "dynamics.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
@@ -91,6 +90,61 @@ FAULTS = {
         "rollout.py", "jax.random.fold_in(device_key, jax.lax.axis_index(vector.AXIS))",
         "jax.random.fold_in(device_key, 0)", LEARNING,
     ),
+    "closest angle is the last": (
+        "evaluation.py", "closest_angle=jnp.where(closer, angle, so_far.closest_angle)",
+        "closest_angle=angle", ["test_evaluation.py"],
+    ),
+    "closest rate is the last": (
+        "evaluation.py", "closest_rate=jnp.where(closer, rate, so_far.closest_rate)",
+        "closest_rate=rate", ["test_evaluation.py"],
+    ),
+    "impulse of a held torque is that of a pulse, in evaluation": (
+        "evaluation.py", "context.torque_duration", "(1 / 240)", ["test_evaluation.py"],
+    ),
+    "impulse of a held torque is that of a pulse, for a reward": (
+        "env.py", "self.context(params).torque_duration,", "INTEGRATION_STEP,",
+        ["test_env.py"],
+    ),
+    "sign in TABLE_5": (
+        "evaluation.py", '"slew2": (0.44228, -0.44228', '"slew2": (0.44228, 0.44228',
+        ["test_evaluation.py"],
+    ),
+    "factor of the time-optimal reference": (
+        "evaluation.py", "return 2 * jnp.sqrt(jnp.sum(momentum)",
+        "return 3 * jnp.sqrt(jnp.sum(momentum)", ["test_evaluation.py"],
+    ),
+    "reward_scale ignored": (
+        "rollout.py", "reward * setup.settings.reward_scale", "reward", ["test_rollout.py"],
+    ),
+    "max_gradient_norm ignored": (
+        "learner.py", "if settings.max_gradient_norm > 0:", "if False:", DESCENT,
+    ),
+    "normalize_advantage ignored: always": (
+        "descent.py", "if settings.normalize_advantage:", "if True:", DESCENT,
+    ),
+    "normalize_advantage ignored: never": (
+        "descent.py", "if settings.normalize_advantage:", "if False:", DESCENT,
+    ),
+    "same shuffle in each pass": (
+        "descent.py", "jax.random.split(pass_key, settings.passes)",
+        "jnp.stack([pass_key] * settings.passes)", DESCENT,
+    ),
+    "same shuffle on each device": (
+        "descent.py", "jax.random.fold_in(pass_key, jax.lax.axis_index(vector.AXIS))",
+        "jax.random.fold_in(pass_key, 0)", DESCENT,
+    ),
+    "approximate KL without its ratio": (
+        "losses.py", "jnp.mean(ratio - 1 - log_ratio)", "jnp.mean(-log_ratio)",
+        ["test_losses.py"],
+    ),
+    "multi-scale features without the period": (
+        "networks.py", "10 * control_period, jnp.log(10 * control_period)",
+        "0 * control_period, 0 * control_period", ["test_networks.py"],
+    ),
+    "observation bound without coasting": (
+        "env.py", "(params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))",
+        "(params.rate_limit + kick)", ["test_env.py"],
+    ),
     "optimizer not restored": (
         "checkpoint.py", "    return restored.replace(key=",
         "    return restored.replace(optimizer=template.optimizer, key=", RUNS,
@@ -103,50 +157,3 @@ FAULTS = {
     ),
 }  # fmt: skip
 """By name: module, code, what it becomes, tests that should catch it."""
-
-
-def main(argv=None) -> int:
-    """Try the faults; returns 1 if one was not caught."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", action="append", choices=FAULTS, help="this one (repeatable)")
-    parser.add_argument("--jobs", default="2", help="test processes")
-    arguments = parser.parse_args(argv)
-    missed = 0
-    for name in arguments.only or FAULTS:
-        caught = caught_by(*FAULTS[name], arguments.jobs)
-        missed += not caught
-        print(f"| {name} | {', '.join(caught) or 'NO TEST'} |", flush=True)
-    return 1 if missed else 0
-
-
-def caught_by(module, code, broken, tests, jobs) -> list[str]:
-    """Names of the first tests to fail when the code is broken."""
-    with tempfile.TemporaryDirectory() as scratch:
-        copy = Path(scratch) / "copy"
-        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", ".venv", "ckpt", "docs"))
-        path = copy / "attjax" / module
-        text = path.read_text()
-        assert text.count(code) == 1, f"{code!r} is {text.count(code)} times in {module}"
-        path.write_text(text.replace(code, broken))
-        done = subprocess.run(
-            [
-                sys.executable,
-                "-m",
-                "pytest",
-                "-q",
-                "-n",
-                jobs,
-                *(f"tests/{test}" for test in tests),
-            ],
-            cwd=copy,
-            env=os.environ | {"PYTHONPATH": str(copy)},
-            capture_output=True,
-            text=True,
-        )
-    assert done.returncode in (0, 1, 2), done.stdout + done.stderr
-    failed = re.findall(r"^(?:FAILED|ERROR) tests/\w+\.py::(\w+)", done.stdout, re.MULTILINE)
-    return list(dict.fromkeys(failed))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

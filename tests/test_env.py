@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from attjax import AttitudeEnv, EnvState, Spacecraft, observation
 from attjax.reward import logarithmic_reward
@@ -104,6 +105,41 @@ def test_observation_space_samples_lie_inside():
     assert jnp.all(jax.vmap(space.contains)(samples))
     assert not space.contains(2 * space.high)
     assert not space.contains(space.high[:3])
+
+
+def test_observation_space_holds_what_coasting_adds():
+    """A spin at the limit about the intermediate axis, kicked, over one step of up to 30 s.
+
+    With moments of 1 to 3 it tips over and gains 2/√3, along (1, 0, −1/√3) of the principal axes;
+    the body's x axis is laid there, as no rate about a principal axis exceeds that at the start.
+    """
+    tilt = Rotation.from_rotvec([0, np.deg2rad(30), 0]).as_matrix()
+    spacecraft = Spacecraft(inertia=tilt.T @ np.diag([1, 2, 3]) @ tilt, torque_levels=(0.5,))
+    env = AttitudeEnv(7199, spacecraft=spacecraft)
+    params, limit = env.default_params, spacecraft.rate_limit
+    step = jax.jit(env.step_env)
+    space, highest = env.observation_space(params), 0.0
+    for steps in range(3000, 7200, 60):
+        w = jnp.array([0, limit * (1 - 1e-6), 0], float)
+        state = EnvState(jnp.array([0.0, 0, 0, 1]), w, jnp.array(0, jnp.int32))
+        observed, *_ = step(None, state, 1, params.replace(frameskip=jnp.array(steps)))
+        assert space.contains(observed)
+        highest = max(highest, float(observed[8]))
+    assert highest == pytest.approx(limit * 2 / 3**0.5, rel=0.02)
+    np.testing.assert_allclose(space.high[:4], 1)
+    np.testing.assert_allclose(space.high[4:8], space.high[8] / 2)
+    np.testing.assert_array_equal(space.low, -space.high)
+
+
+def test_a_reward_sees_the_impulse_of_a_torque_for_as_long_as_it_acts():
+    seen = []
+    for held, duration in ((False, 1 / 240), (True, 24 / 240)):
+        spacecraft = Spacecraft(torque_levels=(0.003,), torque_held=held)
+        env = AttitudeEnv(23, lambda transition: transition.impulse, spacecraft=spacecraft)
+        impulse = env.step_env(None, spinning(0.0), 4, env.default_params)[2]
+        np.testing.assert_allclose(impulse, [0, -0.003 * duration, 0], rtol=1e-6)
+        seen.append(float(impulse[1]))
+    assert seen[1] == pytest.approx(24 * seen[0])
 
 
 def test_reward_compares_with_the_quaternion_of_the_state_passed_in():

@@ -108,3 +108,47 @@ def test_standardize():
     x = losses.standardize(jnp.array([1.0, 2.0, 3.0, 10.0]))
     assert float(x.mean()) == pytest.approx(0, abs=1e-6)
     assert float(x.std()) == pytest.approx(1, rel=1e-6)
+
+
+def test_zero_spread_is_not_divided_by(x64):
+    """σ = 1e-8 as large as what is added to it: ±1e-8/(1e-8 + 1e-8)."""
+    np.testing.assert_allclose(losses.standardize(jnp.array([-1e-8, 1e-8])), [-0.5, 0.5])
+
+
+def test_policy_loss_and_its_diagnostics_worked_by_hand(x64):
+    """Ratios 1.1, 1.5, 0.5 to old probabilities of ½, ε = 0.2: objectives 2.2, 2.4, −1.6."""
+    old = np.log([0.5, 0.5, 0.5])
+    new = np.log([0.55, 0.75, 0.25])
+    loss, diagnostics = losses.clipped_policy_loss(new, old, jnp.array([2.0, 2.0, -2.0]), 0.2)
+    assert float(loss) == pytest.approx(-1.0)
+    assert float(diagnostics["clip_fraction"]) == pytest.approx(2 / 3)
+    kl = np.mean([0.1 - np.log(1.1), 0.5 - np.log(1.5), -0.5 - np.log(0.5)])
+    assert float(diagnostics["approximate_kl"]) == pytest.approx(kl)
+
+
+def test_approximate_kl_has_the_mean_of_the_exact_one(x64):
+    """Schulman's estimate over samples of the old policy, weighted by their probabilities."""
+    old, new = np.array([0.5, 0.3, 0.2]), np.array([0.2, 0.2, 0.6])
+    estimates = [
+        losses.clipped_policy_loss(np.log(new[i : i + 1]), np.log(old[i : i + 1]), jnp.ones(1), 0.2)
+        for i in range(3)
+    ]
+    mean = sum(p * float(x["approximate_kl"]) for p, (_, x) in zip(old, estimates))
+    assert mean == pytest.approx(np.sum(old * np.log(old / new)))
+
+
+def test_a_ratio_on_the_edge_is_not_clipped():
+    _, diagnostics = losses.clipped_policy_loss(jnp.zeros(4), jnp.zeros(4), jnp.ones(4), 0.0)
+    assert diagnostics["clip_fraction"] == 0
+
+
+def test_pick_and_entropy_of_each_sample(x64):
+    """Three actions, two samples."""
+    probabilities = np.array([[0.5, 0.25], [0.25, 0.25], [0.25, 0.5]])
+    log_probabilities = jnp.log(probabilities)
+    picked = losses.pick(log_probabilities, jnp.array([2, 0]))
+    np.testing.assert_allclose(picked, np.log([0.25, 0.25]))
+    np.testing.assert_allclose(
+        losses.pick(log_probabilities, jnp.array([0, 2])), np.log([0.5, 0.5])
+    )
+    np.testing.assert_allclose(losses.entropy(log_probabilities), [1.5 * np.log(2)] * 2)

@@ -28,6 +28,48 @@ def test_sizes_are_table_3():
         assert kernels == [(11, 400), (400, 300), (300, outputs)]
 
 
+def test_layers_begin_orthogonal_and_without_bias(x64):
+    """√2 times orthogonal before a ReLU; 0.01 times for logits, so that all actions are likely."""
+    params = parameters(Policy(hidden_sizes=(8, 5), num_actions=3))
+    for name, last in (("policy", 0.01), ("value", 1.0)):
+        layers = params[name]["params"]
+        for layer, scale in zip(layers.values(), (2**0.5, 2**0.5, last)):
+            singular = np.linalg.svd(layer["kernel"], compute_uv=False)
+            np.testing.assert_allclose(singular, scale)
+            assert not layer["bias"].any()
+        assert len(layers) == 3
+
+
+def test_the_papers_policy_sees_the_observation_and_masks_nothing():
+    observed = observe([0.6, 0.5, -0.4], (0.1, -0.7, 0.5, 0.5))
+    inputs = Policy().encode(observed, CONTEXT)
+    np.testing.assert_array_equal(inputs.features, observed)
+    assert inputs.allowed.shape == (19,) and inputs.allowed.all()
+    assert not Policy(rate_margin=1e-3).encode(observed, CONTEXT).allowed.all()
+
+
+def test_values_and_masked_probabilities_written_out(x64):
+    """With one hidden layer, in NumPy; a masked action has no part of the sum."""
+    policy = Policy(hidden_sizes=(6,), num_actions=4)
+    params = parameters(policy)
+    x = np.random.default_rng(3).normal(size=(5, 11))
+    allowed = np.array([[1, 0, 1, 1], [1, 1, 1, 1], [0, 0, 1, 0], [1, 1, 0, 0], [0, 1, 0, 1]], bool)
+
+    def network(name):
+        first, last = (params[name]["params"][f"Dense_{i}"] for i in range(2))
+        hidden = np.maximum(x @ np.asarray(first["kernel"]) + np.asarray(first["bias"]), 0)
+        return hidden @ np.asarray(last["kernel"]) + np.asarray(last["bias"])
+
+    np.testing.assert_allclose(policy.value(params, x), network("value")[:, 0])
+    inputs = Inputs(jnp.array(x), jnp.array(allowed))
+    weights = np.exp(network("policy")) * allowed
+    expected = weights / weights.sum(axis=1, keepdims=True)
+    probabilities = np.exp(policy.log_probabilities(params, inputs))
+    np.testing.assert_allclose(probabilities, expected.T, atol=1e-15)
+    for row, most in enumerate(expected.argmax(axis=1)):
+        assert np.asarray(policy.logits(params, inputs))[:, row].argmax() == most
+
+
 def test_multiscale_features_resolve_every_decade():
     """A change of 1 % at any distance from the goal moves some feature by 1e-3 or more."""
     for magnitude in 10.0 ** np.arange(-6, 0):
@@ -45,6 +87,21 @@ def test_multiscale_features_make_the_last_stretch_the_same_at_every_rate():
     slow = networks.multiscale_features(observe(rate, (2e-5, 4e-5, -6e-5, 1.0)), contexts[0])
     fast = networks.multiscale_features(observe(rate, (1e-5, 2e-5, -3e-5, 1.0)), contexts[1])
     np.testing.assert_allclose(slow[:-2], fast[:-2], rtol=1e-6)
+
+
+@pytest.mark.parametrize("period", [0.1, 0.025])
+def test_multiscale_features_written_out(x64, period):
+    """tanh(4ⁿ x) scale by scale, then q_s, the period in 0.1 s and its logarithm."""
+    context = CONTEXT.replace(control_period=jnp.array(period))
+    q, w = np.array([0.3, -2e-3, 4e-6, 0.9]), np.array([0.2, -1e-4, 3e-7])
+    x = np.concatenate([q[:3] * 0.05 / period, w])
+    expected = [np.tanh(4.0**n * component) for n in range(9) for component in x]
+    expected += [q[3], period / 0.1, np.log(period / 0.1)]
+    observed = jnp.concatenate([q, np.full(4, 7.0), w])  # q̇ is not looked at
+    np.testing.assert_allclose(networks.multiscale_features(observed, context), expected)
+    wrong = r"observation has shape \(10,\); it must be \(11,\)"
+    with pytest.raises(ValueError, match=wrong):
+        networks.multiscale_features(observed[:10], context)
 
 
 @pytest.mark.parametrize("duration", [1 / 240, 0.1], ids=["pulse", "held"])

@@ -175,29 +175,6 @@ def test_healthy_runs_do_not_diverge():
     assert {int(update) for update in metrics["diverged"].values()} == {-1}
 
 
-@pytest.mark.parametrize("count", [1, 2, 1000, 4096, 300_000])
-def test_random_order_is_a_permutation_that_mixes(count):
-    order = np.asarray(jax.jit(descent.random_order, static_argnums=1)(jax.random.key(0), count))
-    np.testing.assert_array_equal(np.sort(order), np.arange(count))
-    if count >= 1000:
-        # The rank correlation of a random order has standard deviation 1/sqrt(count − 1).
-        correlation = np.corrcoef(order, np.arange(count))[0, 1]
-        assert abs(correlation) < 5 / np.sqrt(count - 1)
-        assert not np.array_equal(order, descent.random_order(jax.random.key(1), count))
-
-
-def test_a_pass_takes_every_sample_once_and_whole():
-    """Fields stay together, neighbours in a block too, whatever their shapes."""
-    numbers = jnp.arange(48)
-    samples = {"plain": numbers, "wide": jnp.stack([numbers, -numbers], axis=1)}
-    order = jnp.array([[3, 0, 5], [1, 4, 2]])
-    taken = [jax.tree.map(lambda x, o=o: descent.take_blocks(x, 6, o), samples) for o in order]
-    assert taken[0]["plain"].tolist() == [*range(24, 32), *range(8), *range(40, 48)]
-    np.testing.assert_array_equal(taken[1]["wide"][:, 1], -taken[1]["plain"])
-    both = np.concatenate([part["plain"] for part in taken])
-    np.testing.assert_array_equal(np.sort(both), numbers)
-
-
 def test_two_devices_take_the_gradient_step_of_one():
     """One minibatch holds all samples, so their order and their halves do not matter."""
     one = small_attitude_setup(1, frameskips=(20,), minibatch_size=64 * 16, passes=1)

@@ -67,3 +67,22 @@ def test_angle_keeps_the_sign_of_the_scalar_part():
 def test_normalize(x64):
     for q in random_quaternions(5):
         np.testing.assert_allclose(quaternions.normalize(jnp.array(3 * q)), q, atol=1e-15)
+
+
+def test_rotation_vector_is_scipys_shortest(x64):
+    """Axis times angle, of q and of −q alike."""
+    for q in random_quaternions(20, seed=3):
+        expected = Rotation.from_quat(q).as_rotvec()
+        np.testing.assert_allclose(quaternions.rotation_vector(jnp.array(q)), expected, atol=1e-14)
+        np.testing.assert_allclose(quaternions.rotation_vector(jnp.array(-q)), expected, atol=1e-14)
+
+
+def test_rotation_vector_at_the_goal_and_just_beside_it(x64):
+    """Twice the vector part there, whatever its size; a half turn keeps the axis as it is."""
+    for vector in ([0, 0, 0], [3e-200, 1e-200, 0], [1e-9, 2e-9, -3e-9]):
+        for sign in (1, -1):
+            q = jnp.array([*vector, sign], float)
+            expected = 2 * sign * np.array(vector, float)
+            np.testing.assert_allclose(quaternions.rotation_vector(q), expected, rtol=1e-12)
+    half_turn = quaternions.rotation_vector(jnp.array([0.6, 0.0, -0.8, 0.0]))
+    np.testing.assert_allclose(half_turn, np.pi * np.array([0.6, 0, -0.8]))

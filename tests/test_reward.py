@@ -140,3 +140,27 @@ def test_gradients_at_rest_at_the_goal_are_finite(reward, sign):
         assert np.all(np.isfinite(gradient))
     near = goal.at[0].set(1e-6)
     assert abs(float(jax.grad(quaternions.error_angle)(near)[0])) == pytest.approx(2, rel=1e-5)
+
+
+def test_the_edge_of_the_goal_is_inside():
+    """φ = 2 atan2(1, 1), a quarter turn, against a goal of as much."""
+    q = jnp.array([1.0, 0, 0, 1.0])
+    edge = transition(q, q)._replace(goal_angle=quaternions.error_angle(q))
+    assert paper_reward(edge) == pytest.approx(np.exp(-0.25 / 0.14) - 1 + 9)
+    assert paper_reward(edge._replace(truncated=jnp.array(True))) == 50
+
+
+def test_improvement_is_that_of_the_rotation_not_of_the_length():
+    """Near the goal and near the antipode; 9° against 10°, each longer or shorter."""
+    for sign in (1, -1):
+        near, far = sign * quaternion(9), sign * quaternion(10)
+        for scale in (0.9, 1.1):
+            closer = scalar_part_increased(jnp.array(scale * far), jnp.array(near))
+            farther = scalar_part_increased(jnp.array(scale * near), jnp.array(far))
+            assert (closer, farther) == ((True, False) if sign > 0 else (False, True))
+
+
+@pytest.mark.parametrize("degrees", [10, 90, 180, 270, 350])
+def test_no_attitude_improves_on_itself(degrees):
+    q = jnp.array(quaternion(degrees))
+    assert not scalar_part_increased(q, q)

@@ -32,3 +32,25 @@ def test_peak_rate_of_steady_spins_and_of_a_sphere():
     expected = [0.3, 0.3, 0.3 * np.sqrt(0.797 * (0.872 + 0.115 - 0.797) / (0.872 * 0.115))]
     np.testing.assert_allclose(rigid_body.peak_rate(spins, inertia), expected, rtol=1e-6)
     np.testing.assert_allclose(rigid_body.peak_rate(spins, jnp.full(3, 0.4)), 0.3, rtol=1e-6)
+
+
+def test_peak_rate_of_a_batch_is_that_of_each(x64):
+    """The three spins at unlike rates, as the rows of one array, with a full tensor."""
+    moments, rotation = np.array([0.2, 0.3, 0.4]), np.linalg.qr(np.arange(9).reshape(3, 3) ** 2)[0]
+    inertia = rotation @ np.diag(moments) @ rotation.T
+    # About the intermediate axis ω² grows by I₂(I₁ + I₃ − I₂)/(I₁I₃) = 9/8.
+    spins = np.array([[0.1], [0.2], [0.3]]) * rotation.T
+    expected = [0.1, 0.2 * np.sqrt(9 / 8), 0.3]
+    np.testing.assert_allclose(rigid_body.peak_rate(spins, jnp.asarray(inertia)), expected)
+
+
+def test_inverse_momentum_and_moments_agree_with_numpy(x64):
+    inertia = rotated_inertia()
+    rates = np.random.default_rng(0).normal(size=(4, 3))
+    np.testing.assert_allclose(rigid_body.inverse(jnp.asarray(inertia)), np.linalg.inv(inertia))
+    momenta = rigid_body.angular_momentum(jnp.asarray(inertia), rates)
+    np.testing.assert_allclose(momenta, [inertia @ w for w in rates])
+    np.testing.assert_allclose(rigid_body.angular_momentum(jnp.asarray(LM50), rates), LM50 * rates)
+    moments = rigid_body.principal_moments(jnp.asarray(inertia))
+    np.testing.assert_allclose(moments, np.sort(LM50))
+    np.testing.assert_array_equal(rigid_body.principal_moments(jnp.asarray(LM50)), LM50)

@@ -140,3 +140,21 @@ def test_devices_hold_the_control_rates_of_their_part():
         step = jax.vmap(attjax.step, (0, 0, None, None))
         after = step(start, action, None, frameskip)
         np.testing.assert_allclose(first.final_observation[rows, :4], after.quaternion, atol=1e-6)
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.005])
+def test_the_learner_sees_the_reward_times_its_scale(scale):
+    """The score of an episode's first step is its reward; both are Eq. 12-13 here."""
+    setup = small_attitude_setup(
+        1, presets.PAPER_FAST, frameskips=(20,), rollout_length=2, reward_scale=scale
+    )
+    env_params = assembly.env_params(setup)
+    state = learner.init(setup, env_params, jax.random.key(0))
+    _, steps = fly(setup, env_params, state)
+    assert np.ptp(steps.score[0]) > 0.1
+    np.testing.assert_allclose(steps.reward[0], scale * steps.score[0], rtol=1e-6)
+    ongoing = ~(steps.terminated[0] | steps.truncated[0])
+    second = steps.score[1] - steps.score[0]
+    np.testing.assert_allclose(
+        steps.reward[1][ongoing], scale * second[ongoing], rtol=1e-4, atol=1e-6
+    )
