@@ -2,7 +2,6 @@
 
 import importlib
 import sys
-from pathlib import Path
 
 from attjax import cli, help_text, run_folder, settings
 
@@ -35,7 +34,7 @@ def _add_output(group):
     format_help = "c: C99, with a test program; onnx and stablehlo need the extra onnx"
     group.add_argument("--format", choices=FORMATS, required=True, help=format_help)
     out_help = "folder to write into"
-    group.add_argument("--out", type=Path, metavar="FOLDER", required=True, help=out_help)
+    group.add_argument("--out", type=cli.path, metavar="FOLDER", required=True, help=out_help)
     overwrite_help = "replace files that an export wrote before"
     group.add_argument("--overwrite", action="store_true", help=overwrite_help)
 

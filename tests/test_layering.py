@@ -8,7 +8,17 @@ from pathlib import Path
 import attjax
 
 LAYERS = [
-    {"user_functions", "specification", "template", "checks", "spaces", "kernel", "vector", "sb3"},
+    {
+        "user_functions",
+        "specification",
+        "template",
+        "checks",
+        "spaces",
+        "kernel",
+        "vector",
+        "sb3",
+        "canvas",
+    },
     {"settings", "programs", "context"},
     {"quaternion", "rigid_body"},
     {"dynamics"},
@@ -20,7 +30,7 @@ LAYERS = [
     {"rollout", "descent"},
     {"ppo"},
     {"presets", "assembly", "run_folder", "nan_search"},
-    {"help_text", "panel"},
+    {"help_text", "panel", "jax_setup"},
     {"progress", "metrics", "report", "cli", "flight_policy"},
     {"checkpoint", "config_file", "tensorboard"},
     {"training", "plots", "playback", "export_c", "export_onnx", "export_stablehlo"},

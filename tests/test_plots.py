@@ -2,6 +2,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from matplotlib import image
 
 from attjax import AttitudeEnv, controllers, evaluation, plots
 from attjax import quaternion as quaternions
@@ -35,7 +36,7 @@ def test_every_figure_is_written(flight, tmp_path):
         "learning_curve", "final_seconds",
     }  # fmt: skip
     for path in written:
-        pixels = plots.plt.imread(path)
+        pixels = image.imread(path)
         assert pixels.shape[0] > 500 and pixels[..., :3].std() > 0.01
 
 
