@@ -162,10 +162,9 @@ def _parse(field, text):
     except ValueError:
         value = text
     try:
-        settings.check(field, value)
+        return settings.check(field, value)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-    return value
 
 
 def overrides(arguments: argparse.Namespace) -> dict:

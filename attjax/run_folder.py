@@ -8,6 +8,7 @@ folder that ``--resume`` goes on from: files are replaced in one step, never edi
 import contextlib
 import dataclasses
 import json
+import operator
 import os
 import shutil
 from pathlib import Path
@@ -24,6 +25,7 @@ except ImportError:  # Windows, where runs are not kept apart
 FORMAT = 5
 CONFIG, METRICS = "config.json", "metrics.csv"
 OWN_FILES = {CONFIG, METRICS, CONFIG + ".tmp", METRICS + ".tmp"}
+LOST = "lost+found"
 EVENTS, EVENT_FILE = "tensorboard", "events.out.tfevents.{}.attjax"
 EVENT_FILES = EVENT_FILE.format("*") + "*"  # a killed process may leave one that ends in .tmp
 
@@ -46,6 +48,7 @@ class Config:
     spacecraft: Spacecraft = LM50
 
     def __post_init__(self):
+        object.__setattr__(self, "seed", operator.index(self.seed))
         longest = max(self.settings.frameskips)
         if self.spacecraft.max_steps(longest) < 1:
             raise ValueError(
@@ -115,9 +118,10 @@ def create(folder: Path, config: Config, overwrite: bool) -> None:
                 )
             _read_json(folder / CONFIG)
             _remove_run(folder)
-        elif not all(map(_is_own, folder.iterdir())):
+        elif others := [path for path in sorted(folder.iterdir()) if _is_in_the_way(path)]:
             raise FolderError(
-                f"{folder} is not empty and holds no attjax run; choose another folder"
+                f"{folder} is not empty and holds no attjax run, but {others[0].name}; "
+                f"choose another folder"
             )
         else:
             _remove_run(folder)
@@ -183,6 +187,23 @@ def remove_events(folder: Path) -> None:
     """Remove the event files that a run wrote; others in their folder stay."""
     for path in (folder / EVENTS).glob(EVENT_FILES):
         path.unlink()
+
+
+def _is_in_the_way(path):
+    """Whether it is of somebody who may not want a run beside it.
+
+    Not so a hidden file, as of version control or a desktop, a file system's own folder, and the
+    file that this process's output is redirected into.
+    """
+    is_hidden_file = path.name.startswith(".") and path.is_file()
+    return not (_is_own(path) or is_hidden_file or path.name == LOST or _is_output(path))
+
+
+def _is_output(path):
+    with contextlib.suppress(OSError):  # a stream that is closed
+        there = path.stat()
+        return any(os.path.samestat(there, os.fstat(stream)) for stream in (1, 2))
+    return False
 
 
 def _is_own(path):
