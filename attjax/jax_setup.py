@@ -21,11 +21,18 @@ SETTINGS = {
     "jax_enable_checks": False,
     "jax_enable_custom_prng": False,
     "jax_enable_x64": False,
+    "jax_error_checking_behavior_divide": "ignore",
+    "jax_error_checking_behavior_nan": "ignore",
+    "jax_error_checking_behavior_oob": "ignore",
+    "jax_exec_time_optimization_effort": 0.0,
     "jax_high_dynamic_range_gumbel": False,
+    "jax_no_execution": False,
+    "jax_no_tracing": False,
     "jax_numpy_dtype_promotion": "standard",
     "jax_numpy_rank_promotion": "allow",
     "jax_optimization_level": "UNKNOWN",
     "jax_random_seed_offset": 0,
+    "jax_scan3": False,
     "jax_threefry_partitionable": True,
     "jax_transfer_guard": "allow",
 }
@@ -45,7 +52,7 @@ def pin_settings() -> None:
     import jax
 
     for name, value in SETTINGS.items():
-        if hasattr(jax.config, name):  # JAX drops one now and then
+        if name in jax.config.values:  # JAX drops one now and then
             jax.config.update(name, value)
 
 
@@ -89,9 +96,12 @@ def cache_folder() -> Path | None:
     """
     base = Path(os.environ.get("XDG_CACHE_HOME", ""))
     try:
-        base = base if base.is_absolute() else Path.home().absolute() / ".cache"
+        if not base.is_absolute():
+            base = Path.home() / ".cache"
         folder = base / "attjax" / "compiled"
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if base.is_absolute():
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            return folder
     except (OSError, RuntimeError):  # the latter: there is no home
-        return None
-    return folder
+        pass
+    return None
