@@ -122,7 +122,7 @@ def fly(
 
     zero = jnp.zeros(episodes, observation.dtype)
     start = Episodes(zero + jnp.inf, zero, zero, zero, zero > 0, zero.astype(jnp.int32), zero, zero)
-    steps = jnp.asarray(params.max_steps_in_episode, jnp.int32)
+    steps = params.max_steps_in_episode
     return jax.lax.fori_loop(0, steps, step, (observation, state, start))[2]
 
 
