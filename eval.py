@@ -1,5 +1,6 @@
 """Judge an attitude controller over random slews, as in the paper's Table 2."""
 
+import contextlib
 import dataclasses
 import json
 import os
@@ -11,6 +12,7 @@ from attjax import cli, config_file, run_folder
 from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
 
 POLICY = "policy"
+STDOUT = Path("-")
 CLASSICAL = ("phase-plane", "feedback")
 USAGE = "eval.py [--checkpoint FOLDER | --controller NAME] [--compare] [FLAG ...]"
 EXAMPLES = """\
@@ -19,6 +21,7 @@ examples:
   python eval.py --checkpoint ckpt/ --frameskip 20  the same at 11.43 Hz
   python eval.py --checkpoint ckpt/ --compare       beside the classical ones
   python eval.py --checkpoint ckpt/ --json result.json --plot figures/
+  python eval.py --checkpoint ckpt/ --json - | python -m json.tool
   python eval.py --checkpoint ckpt/ --playback slews.html
   python eval.py --controller phase-plane           needs no checkpoint
 """
@@ -53,7 +56,7 @@ def _add_conditions(group):
         "TOML file of the spacecraft that flies (default: the one that the policy was trained on; "
         "LM50 for a classical controller)"
     )
-    group.add_argument("--spacecraft", type=Path, metavar="FILE", help=craft_help)
+    group.add_argument("--spacecraft", type=cli.path, metavar="FILE", help=craft_help)
     duration_help = "length of an episode (default: the spacecraft's; LM50's is 43.75)"
     limits = {"above": 0, "high": MOST_DURATION}
     cli.add_number(group, "duration", float, None, duration_help, unit="s", **limits)
@@ -61,14 +64,15 @@ def _add_conditions(group):
 
 
 def _add_output(group):
-    group.add_argument("--json", type=Path, metavar="FILE", help="also write the statistics here")
+    json_help = "also write the statistics here; -: to stdout, and the report to stderr"
+    group.add_argument("--json", type=cli.path, metavar="FILE", help=json_help)
     plot_help = "also draw figures into this folder (needs the extra plot)"
-    group.add_argument("--plot", type=Path, metavar="FOLDER", help=plot_help)
+    group.add_argument("--plot", type=cli.path, metavar="FOLDER", help=plot_help)
     playback_help = (
         "also write a web page that replays slews in 3-D: the controller beside phase-plane, or "
         "phase-plane beside feedback"
     )
-    group.add_argument("--playback", type=Path, metavar="FILE", help=playback_help)
+    group.add_argument("--playback", type=cli.path, metavar="FILE", help=playback_help)
 
 
 @cli.program("eval.py")
@@ -82,14 +86,19 @@ def main(argv=None) -> int:
         arguments.frameskip = _frameskip(arguments, names)
         spacecraft = _spacecraft(arguments, names)
         controllers = {name: _controller(name, arguments, spacecraft) for name in names}
-        _check_writable("--json", arguments.json)
+        if arguments.json != STDOUT:
+            _check_writable("--json", arguments.json)
         _prepare_playback(arguments.playback, spacecraft.max_steps(arguments.frameskip))
         plots = _prepare_plots(arguments.plot)
         metrics = _metrics(arguments.checkpoint) if plots and POLICY in controllers else []
-        return _evaluate(arguments, controllers, spacecraft, plots, metrics)
+        json_file, aside = arguments.json, contextlib.nullcontext()
+        if json_file == STDOUT:
+            json_file, aside = sys.stdout, contextlib.redirect_stdout(sys.stderr)
+        with aside:
+            return _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file)
 
 
-def _evaluate(arguments, controllers, spacecraft, plots, metrics):
+def _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file):
     """Fly, draw, write and print."""
     # Imported late: with them, --help and errors in the arguments would take seconds.
     import jax
@@ -111,10 +120,8 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics):
             written += plots.write_all(flight, folder, metrics if name == POLICY else [])
     seconds = time.monotonic() - start
     try:
-        if arguments.json:
-            content = {"controllers": results} if arguments.compare else results[0]
-            with run_folder.writing(arguments.json):
-                arguments.json.write_text(json.dumps(content, indent=2) + "\n")
+        if json_file:
+            _write_json(json_file, {"controllers": results} if arguments.compare else results[0])
         if arguments.playback:
             _write_playback(arguments, controllers, env, params)
             written.append(arguments.playback)
@@ -129,6 +136,16 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics):
     return 0
 
 
+def _write_json(file, content):
+    """Into a path, or a stream."""
+    text = json.dumps(content, indent=2) + "\n"
+    if not isinstance(file, Path):
+        print(text, end="", file=file, flush=True)
+        return
+    with run_folder.writing(file):
+        file.write_text(text)
+
+
 def _metrics(folder):
     """The rows of the run's metrics.csv, for the learning curve."""
     from attjax import metrics
@@ -140,10 +157,13 @@ def _prepare_plots(folder):
     """The module that draws, with its folder made; None where no plots were asked for."""
     if folder is None:
         return None
+    os.environ["MPLBACKEND"] = "agg"  # one of a notebook or of another matplotlib fails its import
     try:
         from attjax import plots
     except ImportError:
         raise cli.UserError("--plot needs matplotlib: pip install 'attjax[plot]'") from None
+    except ValueError as error:
+        raise cli.UserError(f"--plot: matplotlib cannot read its matplotlibrc: {error}") from None
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

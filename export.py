@@ -4,7 +4,6 @@ import argparse
 import contextlib
 import importlib
 import sys
-from pathlib import Path
 
 from attjax import c_names, cli, run_folder
 
@@ -36,7 +35,7 @@ def _add_output(group):
     format_help = "c: C99 and C++, with a test program; onnx and stablehlo need the extra onnx"
     group.add_argument("--format", choices=FORMATS, required=True, help=format_help)
     out_help = "folder to write into"
-    group.add_argument("--out", type=Path, metavar="FOLDER", required=True, help=out_help)
+    group.add_argument("--out", type=cli.path, metavar="FOLDER", required=True, help=out_help)
     prefix_help = (
         "what the names of the files begin with, and in C those of functions and macros: for two "
         f"rates in one program (default: {c_names.PREFIX})"

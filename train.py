@@ -3,7 +3,6 @@
 import dataclasses
 import importlib
 import sys
-from pathlib import Path
 
 from attjax import cli, config_file, presets, run_folder, settings
 from attjax.specification import LM50
@@ -31,7 +30,7 @@ def parse_arguments(argv):
     preset_help = f"the recipe; flags override it (default: {DEFAULT_PRESET})"
     groups["run"].add_argument("--preset", choices=presets.PRESETS, help=preset_help)
     craft_help = "TOML file that describes the spacecraft and its task (default: LM50, the paper's)"
-    groups["task"].add_argument("--spacecraft", type=Path, metavar="FILE", help=craft_help)
+    groups["task"].add_argument("--spacecraft", type=cli.path, metavar="FILE", help=craft_help)
     for name, group in groups.items():
         cli.add_settings(group, name)
     _add_run(groups["run"])
@@ -47,7 +46,7 @@ def _add_run(group):
     existing.add_argument("--overwrite", action="store_true", help="replace the folder's run")
     cli.add_seed_and_device(group, "seed of everything random")
     config_help = "TOML file with preset, seed, [settings] and [spacecraft]; flags override it"
-    group.add_argument("--config", type=Path, metavar="FILE", help=config_help)
+    group.add_argument("--config", type=cli.path, metavar="FILE", help=config_help)
     print_help = "print the file that reproduces this run, and end"
     group.add_argument("--print-config", action="store_true", help=print_help)
 

@@ -84,9 +84,16 @@ def _first_sight(craft):
 
 
 def num_devices(settings: Settings) -> int:
-    """How many of the devices that there are a training run shares its work out to."""
+    """How many of the devices that there are a training run shares its work out to.
+
+    Each has a spacecraft of each control rate, at least.
+    """
     shared = math.gcd(settings.num_envs, settings.minibatch_size, MAX_DEVICES)
-    most = min(len(jax.devices()), max(1, settings.minibatch_size // MIN_SAMPLES))
+    most = min(
+        len(jax.devices()),
+        max(1, settings.minibatch_size // MIN_SAMPLES),
+        settings.num_envs // len(settings.frameskips),
+    )
     return max(n for n in range(1, shared + 1) if shared % n == 0 and n <= most)
 
 

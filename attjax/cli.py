@@ -1,4 +1,4 @@
-"""What the commands share: arguments, one-line errors, devices, the compile cache."""
+"""What the commands share: arguments, one-line errors, paths, devices."""
 
 import argparse
 import contextlib
@@ -11,7 +11,7 @@ import sys
 import threading
 from pathlib import Path
 
-from attjax import help_text, settings, streams, user_functions
+from attjax import help_text, jax_setup, settings, streams, user_functions
 
 DEVICES = ("auto", "cpu", "gpu")
 OUTPUT_FAILED, BAD_INPUT = 1, 2
@@ -65,11 +65,17 @@ def program(name: str):
 
 @contextlib.contextmanager
 def one_line_errors(prog: str, *kinds: type[Exception]):
-    """Turn exceptions of these kinds into one line on stderr and exit status 2."""
+    """Turn exceptions of these kinds, and what the system says of a file, into one line on stderr
+    and exit status 2.
+    """
     try:
         yield
     except (UserError, user_functions.FunctionError, *kinds) as error:
         _fail(prog, error)
+    except OSError as error:  # a folder that may not be entered, a name that is too long, ...
+        if error.filename is None:
+            raise
+        _fail(prog, f"{error.filename}: {error.strerror}")
 
 
 def error_line(prog: str, message) -> None:
@@ -138,11 +144,21 @@ def quoted(path: Path) -> str:
     return shlex.quote(str(path))
 
 
+def path(text: str) -> Path:
+    """An argparse type: a path, with ``~`` for a home also where the shell leaves it as it is."""
+    if not text or "\0" in text:
+        raise argparse.ArgumentTypeError(f"the path is {text!r}; it must have characters, no NUL")
+    try:
+        return Path(text).expanduser()
+    except RuntimeError:
+        raise argparse.ArgumentTypeError(f"there is no home for {text!r}; write it out") from None
+
+
 def add_checkpoint(group) -> None:
     """Add --checkpoint."""
     folder_help = "folder of the training run (default: ckpt)"
     group.add_argument(
-        "--checkpoint", type=Path, default=Path("ckpt"), metavar="FOLDER", help=folder_help
+        "--checkpoint", type=path, default=Path("ckpt"), metavar="FOLDER", help=folder_help
     )
 
 
@@ -233,10 +249,9 @@ def _parse(field, text):
     except ValueError:
         value = text
     try:
-        settings.check(field, value)
+        return settings.check(field, value)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-    return value
 
 
 def overrides(arguments: argparse.Namespace) -> dict:
@@ -246,27 +261,33 @@ def overrides(arguments: argparse.Namespace) -> dict:
 
 
 def select_device(name: str):
-    """The JAX device for ``--device``, made the default; also turns the compile cache on.
+    """The JAX device for ``--device``, made the default, of JAX as the programs need it.
 
     On CPU each core becomes a device of its own, for training to share its work out to.
 
     Raises:
-        UserError: there is no such device.
+        UserError: there is no such device, or JAX refuses a variable of the environment.
     """
-    import jax
-
+    try:
+        import jax
+    except ValueError as error:
+        named = [x for x in os.environ if x.startswith("JAX_") and x.lower() in str(error).lower()]
+        values = jax_setup.set_variables(named)
+        raise UserError(f"JAX refuses its settings: {values or error}") from None
     if name == "cpu":
         jax.config.update("jax_platforms", "cpu")
+        jax.config.update("jax_platform_name", "cpu")
     with contextlib.suppress(RuntimeError):  # called where JAX runs already, as it is set up there
         jax.config.update("jax_num_cpu_devices", available_cores())
-    jax.config.update("jax_compilation_cache_dir", str(cache_folder()))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
+    jax_setup.pin_settings()
+    jax_setup.keep_compiled()
     try:
         device = jax.devices(None if name == "auto" else name)[0]
-    except RuntimeError:
-        raise UserError(
-            f"--device is {name}, and JAX finds none; it finds {jax.default_backend()}"
-        ) from None
+    except (RuntimeError, AssertionError):  # the latter: JAX_PLATFORMS=cuda, but no such plug-in
+        found = jax_setup.set_variables(jax_setup.CHOOSING_DEVICES)
+        if not found:
+            found = f"it finds {jax.default_backend()}"
+        raise UserError(f"--device is {name}, and JAX finds none; {found}") from None
     jax.config.update("jax_default_device", device)
     return device
 
@@ -276,9 +297,3 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def cache_folder() -> Path:
-    """Where compiled programs are kept between runs: the user's cache folder."""
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "attjax" / "compiled"

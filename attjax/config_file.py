@@ -27,7 +27,7 @@ def read(path: Path) -> dict:
         UserError: it cannot be read, or something in it is unknown or out of range.
     """
     with _one_line(f"--config {path}"):
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = specification.read_toml(path)
     spacecraft = content.pop("spacecraft", None)
     given = content.pop("settings", {})
     if not isinstance(given, dict):
@@ -35,11 +35,8 @@ def read(path: Path) -> dict:
     unknown = content.keys() - {field.name for field in OTHERS} | given.keys() - SETTINGS.keys()
     if unknown:
         raise UserError(f"--config {path} has unknown names: {', '.join(sorted(unknown))}")
-    given = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
-    given |= content
     with _one_line(f"--config {path}"):
-        for name, value in given.items():
-            settings.check(FIELDS[name], value)
+        given = {k: settings.check(FIELDS[k], v) for k, v in (given | content).items()}
         if spacecraft is not None:
             given["spacecraft"] = specification.from_lists(spacecraft, specification.NEEDED)
     return given
@@ -61,7 +58,7 @@ def _one_line(what):
         yield
     except OSError as error:
         raise UserError(f"{what} cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UserError(f"{what} is no TOML: {error}") from None
     except ValueError as error:
         raise UserError(f"{what}: {error}") from None

@@ -13,7 +13,7 @@ from attjax import rigid_body, spacecraft, spaces
 from attjax.context import Context
 from attjax.reward import Transition, paper_reward
 from attjax.spacecraft import EnvParams, EnvState
-from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft
+from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft, integer
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,10 +44,12 @@ class AttitudeEnv:
 
     def __post_init__(self):
         most = self.spacecraft.max_steps(0) - 1
-        if not (isinstance(self.frameskip, int) and 0 <= self.frameskip <= most):
+        frameskip = integer(self.frameskip)
+        if frameskip is None or not 0 <= frameskip <= most:
             raise ValueError(
                 f"frameskip is {self.frameskip!r}; it must be an integer from 0 to {most}"
             )
+        object.__setattr__(self, "frameskip", frameskip)  # as JAX compiles for each it is told of
 
     name = "AttitudeEnv"
 

@@ -16,6 +16,7 @@ from attjax.context import Context
 from attjax.controllers import average_torque
 from attjax.env import AttitudeEnv
 from attjax.spacecraft import EnvParams, EnvState
+from attjax.specification import integer
 
 Controller = Callable[[chex.Array, Context], chex.Array]
 """``act(observation (11,), context) -> action``; a pytree, e.g. ``jax.tree_util.Partial``."""
@@ -90,8 +91,8 @@ def fly(
     Raises:
         ValueError: there are none.
     """
-    if episodes < 1:
-        raise ValueError(f"episodes is {episodes}; it must be at least 1")
+    if (integer(episodes) or 0) < 1:
+        raise ValueError(f"episodes is {episodes!r}; it must be an integer at least 1")
     observation, state = random_slews(env, params, key, episodes)
     context = env.context(params)
 
@@ -147,11 +148,11 @@ def record(
 def conditions(env: AttitudeEnv, params: EnvParams, seed: int, episodes: int) -> dict:
     """What the episodes of :func:`fly` have in common, for ``eval.py --json``."""
     return {
-        "episodes": episodes,
+        "episodes": integer(episodes),
         "frameskip": env.frameskip,
         "control_hz": 1 / env.control_period,
         "duration_s": int(params.max_steps_in_episode) * env.control_period,
-        "seed": seed,
+        "seed": integer(seed),
     }
 
 

@@ -16,6 +16,7 @@ from gymnasium.vector.utils import batch_space
 from attjax import checks, programs
 from attjax.env import AttitudeEnv
 from attjax.reward import REWARDS
+from attjax.specification import integer
 
 ID = "attjax/Slew-v0"
 ROUNDING = 1e-6
@@ -63,7 +64,7 @@ class SlewEnv(gymnasium.Env):
             ValueError: there are options.
         """
         _refuse(options)
-        super().reset(seed=seed)
+        super().reset(seed=seed if integer(seed) is None else integer(seed))
         observation, self._state = programs.reset(self._env, self._params, _key(self.np_random))
         return np.array(observation), {}
 
@@ -123,10 +124,10 @@ class SlewVectorEnv(VectorEnv):
         params=None,
         max_episode_steps=None,
     ):
-        if not isinstance(num_envs, int) or num_envs < 1:
+        if (integer(num_envs) or 0) < 1:
             raise ValueError(f"num_envs is {num_envs!r}; it must be a positive integer")
         env, params = _environment(frameskip, reward, env, params, max_episode_steps)
-        self.num_envs = num_envs
+        self.num_envs = integer(num_envs)
         self._env, self._params = env, params
         self.single_observation_space, self.single_action_space = _spaces(env, params)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -144,9 +145,9 @@ class SlewVectorEnv(VectorEnv):
             ValueError: there are options, or the seed is no integer.
         """
         _refuse(options)
-        if seed is not None and not isinstance(seed, int | np.integer):
+        if seed is not None and integer(seed) is None:
             raise ValueError(f"seed is {seed!r}; it must be an integer, one for all environments")
-        super().reset(seed=seed)
+        super().reset(seed=integer(seed))
         self._key, observations, self._states = programs.reset_batch(
             self._env, self._params, _key(self.np_random), self.num_envs
         )

@@ -31,6 +31,9 @@ class Setup:
         groups: of spacecraft, equal in number, that the metrics are told apart by.
         num_devices: devices, or CPU cores as devices, that share the spacecraft and each
             minibatch; a divisor of the numbers of both.
+
+    Raises:
+        ValueError: a device has fewer spacecraft than there are groups.
     """
 
     env: Any
@@ -38,6 +41,13 @@ class Setup:
     settings: Settings
     groups: int = 1
     num_devices: int = 1
+
+    def __post_init__(self):
+        if self.envs_per_device < self.groups:
+            raise ValueError(
+                f"num_devices is {self.num_devices}, for {self.envs_per_device} spacecraft each; "
+                f"they must be at least {self.groups}, one for each group"
+            )
 
     @property
     def slices(self) -> list[slice]:

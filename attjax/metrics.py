@@ -16,23 +16,24 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def block_row(metrics: dict, agent_steps: int, wall_s: float) -> dict:
-    """One row of metrics.csv from what ``ppo.train_block`` returns.
+def block_row(metrics: dict, frameskips: tuple[int, ...], agent_steps: int, wall_s: float) -> dict:
+    """One row of metrics.csv from what ``ppo.train_block`` returns for groups of these frameskips.
 
     Rates and the error are means over all episodes that ended; the return (Eq. 12–13) is
     that of the slowest control rate, the paper's, as returns of several rates do not
     compare. Cells are None where no episode ended.
     """
     sums = {name: np.asarray(x, float) for name, x in metrics["episodes"].items()}
-    episodes, slowest = sums["episodes"].sum(), sums["episodes"][-1]
+    is_slowest = np.equal(frameskips, max(frameskips))
+    episodes, slowest = sums["episodes"].sum(), sums["episodes"][is_slowest].sum()
     row = {"agent_steps": agent_steps, "wall_s": round(wall_s, 2), "episodes": int(episodes)}
     for name in ("success_rate", "overspeed_rate", "terminal_error_deg"):
         row[name] = sums[name].sum() / episodes if episodes else None
     row["episode_return_n"] = int(slowest)
     row["episode_return"] = row["episode_return_std"] = None
     if slowest:
-        mean = sums["score"][-1] / slowest
-        variance = max(sums["score_squared"][-1] / slowest - mean**2, 0.0)
+        mean = sums["score"][is_slowest].sum() / slowest
+        variance = max(sums["score_squared"][is_slowest].sum() / slowest - mean**2, 0.0)
         row |= {"episode_return": mean, "episode_return_std": variance**0.5}
     return row | {name: float(x) for name, x in metrics["losses"].items()}
 

@@ -13,6 +13,7 @@ from attjax import quaternion as quaternions
 from attjax.env import AttitudeEnv
 from attjax.evaluation import TABLE_5, Controller
 from attjax.spacecraft import EnvParams, EnvState
+from attjax.specification import integer
 
 RANDOM_SLEWS = 4
 MAX_STEPS = 20_000
@@ -51,7 +52,7 @@ def page(
         "pulse": float(env.context(params).torque_duration),
         "frameskip": env.frameskip,
         "steps": steps,
-        "seed": seed,
+        "seed": integer(seed),
         "checkpoint": checkpoint,
         "inertia": np.asarray(params.inertia).tolist(),
         "rateLimit": float(params.rate_limit),

@@ -6,29 +6,18 @@ from pathlib import Path
 
 import jax
 import jax.numpy as jnp
-import matplotlib
 import numpy as np
 
-from attjax import evaluation
+from attjax import canvas, evaluation
 from attjax import quaternion as quaternions
 from attjax.env import AttitudeEnv
 from attjax.evaluation import TABLE_5, Controller, Episodes
 from attjax.report import PAPER_TABLE_2, is_the_papers
 from attjax.spacecraft import EnvParams, EnvState
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
-
 STYLES = ("-", "--", "-.", ":")
 RANDOM_SLEWS = 200
 FINAL_SECONDS = 8.0
-
-
-def _save(figure, folder: Path, name: str) -> Path:
-    path = folder / f"{name}.png"
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
-    return path
 
 
 def _angles_deg(quaternion):
@@ -99,13 +88,14 @@ def write_all(flight: Flight, folder: Path, metrics: list[dict]) -> list[Path]:
     return paths
 
 
+@canvas.own_style()
 def slews(flight: Flight, folder: Path) -> list[Path]:
     """What the paper's Figs. 5–7 show, of Table 5's slews, and the torques chosen."""
     time, history = flight.table_5
     paths = []
     for index, name in enumerate(TABLE_5):
         one = jax.tree.map(lambda x, index=index: np.asarray(x[:, index]), history)
-        figure, axes = plt.subplots(4, 1, figsize=(7, 9), sharex=True, layout="constrained")
+        figure, axes = canvas.subplots(4, 1, figsize=(7, 9), sharex=True)
         _plot_components(axes[0], time, one.quaternion, ("q1", "q2", "q3", "q_s"))
         _plot_components(axes[2], time, one.angular_velocity, ("ω1", "ω2", "ω3"))
         _plot_pulses(axes[3], time, one.torque, flight.env.spacecraft)
@@ -123,7 +113,7 @@ def slews(flight: Flight, folder: Path) -> list[Path]:
             axis.set_ylabel(label)
         axes[3].set_xlabel("time (s)")
         axes[0].set_title(f"Table 5, test {index + 1}, at {flight.hz}")
-        paths.append(_save(figure, folder, name))
+        paths.append(canvas.save(figure, folder, name))
     return paths
 
 
@@ -145,12 +135,13 @@ def _plot_pulses(axis, time, torque, spacecraft):
     axis.legend(loc="upper right", ncols=4, fontsize=8)
 
 
+@canvas.own_style()
 def final_seconds(flight: Flight, folder: Path) -> Path:
     """The end of Table 5's slews, magnified: how a controller holds its target."""
     time, history = flight.table_5
     shown = time > time[-1] - FINAL_SECONDS
     angles = _angles_deg(history.quaternion)[shown]
-    figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
+    figure, axis = canvas.subplots(figsize=(7, 4))
     for index, (marker, values) in enumerate(zip("o^s", angles.T)):
         axis.plot(
             time[shown], values, marker + "-", linewidth=1, markersize=3, label=f"test {index + 1}"
@@ -160,14 +151,15 @@ def final_seconds(flight: Flight, folder: Path) -> Path:
     axis.set_ylabel("error angle φ (°)")
     axis.set_title(f"Table 5, the last {FINAL_SECONDS:g} s, at {flight.hz}")
     axis.legend(loc="upper right", ncols=4, fontsize=8)
-    return _save(figure, folder, "final_seconds")
+    return canvas.save(figure, folder, "final_seconds")
 
 
+@canvas.own_style()
 def error_histories(flight: Flight, folder: Path) -> Path:
     """The error angle of random slews over time, with quantiles."""
     time, history = flight.record(jax.tree.map(lambda x: x[:RANDOM_SLEWS], flight.starts))
     angles = _angles_deg(history.quaternion)
-    figure, axis = plt.subplots(figsize=(7, 4.5), layout="constrained")
+    figure, axis = canvas.subplots(figsize=(7, 4.5))
     axis.semilogy(time, angles, color="0.8", linewidth=0.3)
     for quantile, style in ((0.95, "--"), (0.5, "-"), (0.05, ":")):
         axis.semilogy(
@@ -179,15 +171,16 @@ def error_histories(flight: Flight, folder: Path) -> Path:
     axis.set_ylabel("error angle φ (°)")
     axis.set_title(f"{angles.shape[1]} random slews at {flight.hz}, and quantiles")
     axis.legend()
-    return _save(figure, folder, "error_histories")
+    return canvas.save(figure, folder, "error_histories")
 
 
+@canvas.own_style()
 def distributions(flight: Flight, folder: Path) -> Path:
     """Cumulative distribution of the closest and terminal error.
 
     The paper's Table 2 stands beside that of its spacecraft, LM50.
     """
-    figure, axes = plt.subplots(1, 2, figsize=(9, 4), sharey=True, layout="constrained")
+    figure, axes = canvas.subplots(1, 2, figsize=(9, 4), sharey=True)
     for axis, state in zip(axes, ("closest", "terminal")):
         ours = np.sort(np.rad2deg(np.asarray(getattr(flight.flown, f"{state}_angle"))))
         axis.semilogx(ours, np.arange(1, len(ours) + 1) / len(ours), "k", label="this controller")
@@ -198,9 +191,10 @@ def distributions(flight: Flight, folder: Path) -> Path:
         axis.grid(alpha=0.3)
     axes[0].set_ylabel("share of the slews")
     axes[0].legend()
-    return _save(figure, folder, "distributions")
+    return canvas.save(figure, folder, "distributions")
 
 
+@canvas.own_style()
 def settling(flight: Flight, folder: Path) -> Path:
     """Settling time against slew angle, with the time-optimal reference."""
     flown, env, params = flight.flown, flight.env, flight.params
@@ -210,7 +204,7 @@ def settling(flight: Flight, folder: Path) -> Path:
     angles = _angles_deg(start)
     settled = evaluation.successes(flown, params)
     times = evaluation.settling_times(flown, env)
-    figure, axis = plt.subplots(figsize=(7, 4.5), layout="constrained")
+    figure, axis = canvas.subplots(figsize=(7, 4.5))
     axis.plot(angles[settled], times[settled], ".", color="0.6", markersize=2, label="slews")
     edges = np.linspace(angles.min(), angles.max(), 13)
     middle = (edges[:-1] + edges[1:]) / 2
@@ -226,9 +220,10 @@ def settling(flight: Flight, folder: Path) -> Path:
     axis.set_ylabel(f"settling time to {flight.goal_deg:g}° (s)")
     axis.set_title(f"Settling at {flight.hz}")
     axis.legend()
-    return _save(figure, folder, "settling")
+    return canvas.save(figure, folder, "settling")
 
 
+@canvas.own_style()
 def learning_curve(metrics: list[dict], is_the_papers: bool, folder: Path) -> Path:
     """Return, success and terminal error over agent steps, from a run's metrics."""
     rows = [row for row in metrics if row["episode_return"]]
@@ -238,7 +233,7 @@ def learning_curve(metrics: list[dict], is_the_papers: bool, folder: Path) -> Pa
         ("success_rate", "success rate"),
         ("terminal_error_deg", "terminal error (°)"),
     )
-    figure, axes = plt.subplots(3, 1, figsize=(7, 7), sharex=True, layout="constrained")
+    figure, axes = canvas.subplots(3, 1, figsize=(7, 7), sharex=True)
     for axis, (name, label) in zip(axes, columns):
         axis.plot(steps, [float(row[name]) for row in rows], "k", linewidth=1)
         axis.set_ylabel(label)
@@ -249,4 +244,4 @@ def learning_curve(metrics: list[dict], is_the_papers: bool, folder: Path) -> Pa
     axes[2].set_yscale("log")
     axes[2].set_xlabel("agent steps (millions)")
     axes[0].set_title("Learning: training episodes")
-    return _save(figure, folder, "learning_curve")
+    return canvas.save(figure, folder, "learning_curve")

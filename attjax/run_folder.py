@@ -8,6 +8,7 @@ folder that ``--resume`` goes on from: files are replaced in one step, never edi
 import contextlib
 import dataclasses
 import json
+import operator
 import os
 import re
 import sys
@@ -25,6 +26,7 @@ except ImportError:  # Windows, where runs are not kept apart
 
 FORMAT = 5
 CONFIG, METRICS = belongings.CONFIG, belongings.METRICS
+LOST = "lost+found"
 
 
 class FolderError(Exception):
@@ -45,6 +47,7 @@ class Config:
     spacecraft: Spacecraft = LM50
 
     def __post_init__(self):
+        object.__setattr__(self, "seed", operator.index(self.seed))
         longest = max(self.settings.frameskips)
         if self.spacecraft.max_steps(longest) < 1:
             raise ValueError(
@@ -134,9 +137,10 @@ def create(folder: Path, config: Config, overwrite: bool) -> None:
                     f"--overwrite to replace it, or another --checkpoint"
                 )
             belongings.replace_run(folder, run_id(folder), new)
-        elif any(path.name not in belongings.BEGUN for path in folder.iterdir()):
+        elif others := [path for path in sorted(folder.iterdir()) if _is_in_the_way(path)]:
             raise FolderError(
-                f"{folder} is not empty and holds no attjax run; choose another folder"
+                f"{folder} is not empty and holds no attjax run, but {others[0].name}; "
+                f"choose another folder"
             )
         else:
             replace(folder / CONFIG, new)
@@ -213,3 +217,21 @@ def _read_json(path):
     if not isinstance(content, dict) or content.get("program") != "attjax":
         raise FolderError(f"{path} was written by another program")
     return content
+
+
+def _is_in_the_way(path):
+    """Whether it is of somebody who may not want a run beside it.
+
+    Not so a hidden file, as of version control or a desktop, a file system's own folder, and the
+    file that this process's output is redirected into.
+    """
+    is_hidden_file = path.name.startswith(".") and path.is_file()
+    is_tolerated = is_hidden_file or path.name == LOST or _is_output(path)
+    return not is_tolerated and path.name not in belongings.BEGUN
+
+
+def _is_output(path):
+    with contextlib.suppress(OSError):  # a stream that is closed
+        there = path.stat()
+        return any(os.path.samestat(there, os.fstat(stream)) for stream in (1, 2))
+    return False

@@ -8,6 +8,7 @@ import functools
 import math
 
 from attjax import user_functions
+from attjax.specification import plain
 
 SEED = {"low": 0, "below": 2**32}
 FRAMESKIP = {"low": 0, "below": 10_500}
@@ -151,7 +152,7 @@ class Settings:
 
     def __post_init__(self):
         for field in dataclasses.fields(self):
-            check(field, getattr(self, field.name))
+            object.__setattr__(self, field.name, check(field, getattr(self, field.name)))
         if self.num_envs < len(self.frameskips):
             raise ValueError(
                 f"num_envs is {self.num_envs}; it must be at least {len(self.frameskips)}, "
@@ -200,11 +201,16 @@ def from_json(values: dict) -> Settings:
     if set(values) != names:
         wrong = sorted(set(values) ^ names)
         raise ValueError(f"settings are unknown or missing: {', '.join(wrong)}")
-    return Settings(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
+    return Settings(**values)
 
 
-def check(field: dataclasses.Field, value) -> None:
-    """Raise ValueError, naming what is allowed, unless ``value`` fits the setting."""
+def check(field: dataclasses.Field, value):
+    """Return a value that fits the setting, as Python's own: lists and NumPy's numbers will do.
+
+    Raises:
+        ValueError: it does not fit; the message names what is allowed.
+    """
+    value = plain(value)
     is_tuple = field.type == tuple[int, ...]
     kind = int if is_tuple else field.type
     elements = value if is_tuple else (value,)
@@ -213,6 +219,7 @@ def check(field: dataclasses.Field, value) -> None:
         name = {int: "an integer", float: "a number", bool: "true or false"}.get(kind, "")
         allowed = ["integers" if is_tuple else name, limits(field)]
         raise ValueError(f"{field.name} is {value!r}; it must be {' '.join(filter(None, allowed))}")
+    return value
 
 
 def _fits(kind, limits, x):

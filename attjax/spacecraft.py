@@ -1,6 +1,7 @@
 """One spacecraft: its state, its parameters (Table 1, section 2.3) and the agent step."""
 
 import dataclasses
+import operator
 
 import chex
 import jax
@@ -171,6 +172,7 @@ def step(
         >>> round(float(step(goal, 1).angular_velocity[0]), 6)   # 0.5 N m for 1/240 s
         0.002389
     """
+    frameskip = operator.index(frameskip)  # NumPy's own could overflow
     params = default_params(frameskip) if params is None else params
     check_params(params, frameskip)
     action = checks.integer("action", action, 0, len(params.torque_table) - 1)

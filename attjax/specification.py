@@ -3,8 +3,10 @@
 This module imports nothing heavy, so that errors in a description are instant.
 """
 
+import codecs
 import dataclasses
 import math
+import operator
 import tomllib
 from pathlib import Path
 
@@ -70,7 +72,7 @@ class Spacecraft:
 
     def __post_init__(self):
         for field in dataclasses.fields(self):
-            object.__setattr__(self, field.name, _tuples(getattr(self, field.name)))
+            object.__setattr__(self, field.name, plain(getattr(self, field.name)))
         if not isinstance(self.name, str) or not self.name.isprintable() or not self.name:
             raise ValueError(f"name is {self.name!r}; it must be a line of text")
         if not isinstance(self.torque_held, bool):
@@ -153,7 +155,7 @@ class Spacecraft:
             OSError: it cannot be read.
             ValueError: it is no TOML, or something in it is not as said.
         """
-        values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        values = read_toml(path)
         return from_lists({"name": Path(path).stem} | values, NEEDED)
 
     @property
@@ -175,7 +177,21 @@ class Spacecraft:
 
     def max_steps(self, frameskip: int) -> int:
         """Whole agent steps in an episode, for that many RK4 steps after the first in each."""
-        return int(self.duration / INTEGRATION_STEP + 1e-6) // (frameskip + 1)
+        return int(self.duration / INTEGRATION_STEP + 1e-6) // (operator.index(frameskip) + 1)
+
+
+def read_toml(path: str | Path) -> dict:
+    """A TOML file's content; it may begin with a byte order mark, and then be in UTF-16, too.
+
+    Editors and shells of Windows write such files.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is no TOML.
+    """
+    content = Path(path).read_bytes()
+    is_utf_16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return tomllib.loads(content.decode("utf-16" if is_utf_16 else "utf-8-sig"))
 
 
 def from_lists(values: dict, needed: tuple[str, ...] = ()) -> Spacecraft:
@@ -196,10 +212,24 @@ def from_lists(values: dict, needed: tuple[str, ...] = ()) -> Spacecraft:
     return Spacecraft(**values)
 
 
-def _tuples(value):
-    """Tuples for lists and arrays: a spacecraft can be hashed, and cannot be changed."""
+def plain(value):
+    """Tuples for lists and arrays, Python's numbers for NumPy's: they can be hashed and written."""
     value = value.tolist() if hasattr(value, "tolist") else value
-    return tuple(map(_tuples, value)) if isinstance(value, list | tuple) else value
+    return tuple(map(plain, value)) if isinstance(value, list | tuple) else value
+
+
+def integer(x) -> int | None:
+    """X as Python's integer, whatever library it is an integer of; None: it is none.
+
+    Example:
+        >>> import numpy as np
+        >>> integer(np.int64(20)), integer(True), integer(20.0)
+        (20, None, None)
+    """
+    try:
+        return None if isinstance(x, bool) else operator.index(x)
+    except TypeError:
+        return None
 
 
 def _check_number(name, x, low, high):

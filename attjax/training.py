@@ -129,7 +129,9 @@ class Run:
                 names = ", ".join(name for name, update in diverged.items() if update == first)
                 return self._divergence(first, 1, names)
             self.update += count
-            row = metrics.block_row(block, self.agent_steps, time.monotonic() - start)
+            row = metrics.block_row(
+                block, self.settings.frameskips, self.agent_steps, time.monotonic() - start
+            )
             self.terminal_error = row["terminal_error_deg"]
             for log in self.logs:
                 log.append(row)

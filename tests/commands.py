@@ -25,6 +25,14 @@ def run(script, *arguments, **options):
     return subprocess.run(command, capture_output=True, text=True, timeout=300, **options)
 
 
+def python(code, *arguments, **options):
+    """A process that finds attjax and the programs."""
+    code = f"import sys\nsys.path.insert(0, {str(ROOT)!r})\n{code}"
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    options = {"capture_output": True, "text": True, "timeout": 300} | options
+    return subprocess.run(command, **options)
+
+
 def one_line_error(main, arguments, capsys):
     with pytest.raises(SystemExit) as exit_:
         main(arguments)

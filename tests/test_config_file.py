@@ -62,7 +62,7 @@ def test_bad_files(tmp_path, capsys, text, expected):
     path = tmp_path / "run.toml"
     path.write_text(text)
     assert expected in one_line_error(train_script.main, ["--config", str(path)], capsys)
-    path.write_bytes(b"\xff\xfe")
+    path.write_bytes(b"\xff\xfe\xff")  # half a character of UTF-16
     assert "is no TOML" in one_line_error(train_script.main, ["--config", str(path)], capsys)
 
 

@@ -171,6 +171,17 @@ def test_actions_out_of_the_space_are_refused(action):
         envs.step([action, 0] if np.ndim(action) == 0 else [[1, 2]])
 
 
+def test_numpys_integers_are_taken():
+    envs = SlewVectorEnv(np.int64(2), frameskip=np.uint8(20))
+    assert envs.num_envs == 2
+    np.testing.assert_array_equal(
+        envs.reset(seed=np.int64(3))[0], SlewVectorEnv(2).reset(seed=3)[0]
+    )
+    np.testing.assert_array_equal(SlewEnv().reset(seed=np.uint8(3))[0], SlewEnv().reset(seed=3)[0])
+    with pytest.raises(ValueError, match="num_envs is True"):
+        SlewVectorEnv(True)
+
+
 def test_other_bad_arguments_are_refused():
     for make in (SlewEnv, SlewVectorEnv):
         with pytest.raises(ValueError, match=r"reward is 'pape'.* 'paper', 'logarithmic' or a f"):

@@ -15,11 +15,15 @@ def test_row_pools_rates_and_takes_the_return_of_the_slowest():
         episodes=[3, 1], score=[900, 50], score_squared=[300_000, 2500],
         success_rate=[3, 0], overspeed_rate=[0, 1], terminal_error_deg=[0.3, 20.1],
     )  # fmt: skip
-    row = metrics.block_row(block, 4096, 1.5)
+    row = metrics.block_row(block, (5, 20), 4096, 1.5)
     assert row["episodes"] == 4 and row["episode_return_n"] == 1
     assert row["success_rate"] == 0.75 and row["overspeed_rate"] == 0.25
     assert row["terminal_error_deg"] == pytest.approx(5.1)
     assert row["episode_return"] == 50 and row["episode_return_std"] == 0
+    turned = metrics.block_row(block, (20, 5), 4096, 1.5)
+    assert turned["episode_return"] == 300 and turned["episode_return_n"] == 3
+    both = metrics.block_row(block, (20, 20), 4096, 1.5)
+    assert both["episode_return"] == 950 / 4 and both["episode_return_n"] == 4
 
 
 def test_row_is_empty_where_no_episode_ended():
@@ -29,7 +33,7 @@ def test_row_is_empty_where_no_episode_ended():
             episodes=zeros, score=zeros, score_squared=zeros,
             success_rate=zeros, overspeed_rate=zeros, terminal_error_deg=zeros,
         ),
-        1, 1.0,
+        (5, 20), 1, 1.0,
     )  # fmt: skip
     assert row["episodes"] == 0
     assert row["success_rate"] is row["episode_return"] is row["terminal_error_deg"] is None

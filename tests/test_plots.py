@@ -1,7 +1,9 @@
 import jax
 import jax.numpy as jnp
+import matplotlib
 import numpy as np
 import pytest
+from matplotlib import image
 
 from attjax import AttitudeEnv, controllers, evaluation, plots
 from attjax import quaternion as quaternions
@@ -35,8 +37,19 @@ def test_every_figure_is_written(flight, tmp_path):
         "learning_curve", "final_seconds",
     }  # fmt: skip
     for path in written:
-        pixels = plots.plt.imread(path)
+        pixels = image.imread(path)
         assert pixels.shape[0] > 500 and pixels[..., :3].std() > 0.01
+
+
+def test_a_figure_is_the_same_in_any_style_of_the_user(flight, tmp_path):
+    first = plots.distributions(flight, tmp_path).read_bytes()
+    hostile = {
+        "text.usetex": True, "axes.facecolor": "black", "savefig.dpi": 20, "font.size": 30,
+        "savefig.format": "pdf", "savefig.bbox": "tight", "figure.autolayout": True,
+    }  # fmt: skip
+    with matplotlib.rc_context(hostile):
+        assert plots.distributions(flight, tmp_path).read_bytes() == first
+        assert {name: matplotlib.rcParams[name] for name in hostile} == hostile
 
 
 def test_a_run_in_which_no_episode_ended_has_no_learning_curve(flight, tmp_path, monkeypatch):

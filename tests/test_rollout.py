@@ -27,6 +27,20 @@ def test_spacecraft_are_shared_out_among_the_control_rates():
         np.testing.assert_allclose(features[group, -2], 10 * period, rtol=1e-6)
 
 
+def test_every_control_rate_has_spacecraft_on_any_number_of_devices(monkeypatch):
+    for devices in range(1, 9):
+        monkeypatch.setattr(jax, "devices", lambda *_, devices=devices: [None] * devices)
+        for num_envs in (5, 6, 8, 16, 64):
+            settings = dataclasses.replace(
+                presets.PRECISE, num_envs=num_envs, rollout_length=4096, minibatch_size=4096
+            )
+            setup = assembly.setup(settings, num_devices=assembly.num_devices(settings))
+            assert all(group.start < group.stop for group in setup.slices), (devices, num_envs)
+    settings = dataclasses.replace(settings, num_envs=6)
+    with pytest.raises(ValueError, match="num_devices is 2, for 3 spacecraft each; they must be"):
+        assembly.setup(settings, num_devices=2)
+
+
 def test_rollout_and_gradient_steps_each_leave_a_fresh_key():
     """A key used twice, in a rollout and for its shuffles, would tie them to each other."""
     setup = small_attitude_setup(2)

@@ -1,6 +1,7 @@
 import dataclasses
 import json
 
+import numpy as np
 import pytest
 
 from attjax import settings
@@ -34,12 +35,29 @@ def test_total_steps_round_up_to_whole_updates():
     assert chosen.num_updates == 2 and chosen.minibatches == 10
 
 
+@pytest.mark.parametrize("integer", [np.int64, np.uint16, np.array], ids=lambda x: x.__name__)
+def test_numbers_of_numpy_are_numbers(integer):
+    chosen = dataclasses.replace(
+        PRECISE, num_envs=integer(64), frameskips=[integer(5), integer(20)], clip=np.float32(0.25),
+        minibatch_size=integer(64), normalize_advantage=np.True_,
+    )  # fmt: skip
+    plain = dataclasses.replace(
+        PRECISE, num_envs=64, frameskips=(5, 20), clip=0.25, minibatch_size=64,
+        normalize_advantage=True,
+    )  # fmt: skip
+    assert chosen == plain and hash(chosen) == hash(plain)
+    assert json.dumps(dataclasses.asdict(chosen)) == json.dumps(dataclasses.asdict(plain))
+
+
 @pytest.mark.parametrize(
     "name, value, allowed",
     [
         ("num_envs", 0, "an integer at least 1"),
         ("num_envs", 2.5, "an integer"),
         ("num_envs", True, "an integer"),
+        ("num_envs", np.True_, "an integer"),
+        ("num_envs", np.float64(64), "an integer"),
+        ("clip", np.True_, "a number"),
         ("num_envs", 4, "at least 5, the number of frameskips"),
         ("frameskips", (), "integers at least 0 and below 10500"),
         ("frameskips", (5, -1), "integers at least 0"),
