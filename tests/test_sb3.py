@@ -38,7 +38,7 @@ def test_infos_at_the_end_are_those_that_sb3_reads(time_limit_terminates):
 def test_overspeed_is_no_time_limit_and_rewards_are_scaled():
     vec_env = as_vec_env(make_vec(1), reward_scale=0.01)
     vec_env.reset()
-    vec_env.vector_env._states = vec_env.vector_env._states.replace(
+    vec_env.vector_env._state = vec_env.vector_env._state.replace(
         angular_velocity=np.array([[0.6, 0.0, 0.0]], np.float32)
     )
     _, rewards, ended, infos = vec_env.step(np.zeros(1, int))
