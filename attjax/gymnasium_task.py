@@ -86,7 +86,7 @@ class Task:
     def _check_reset(self):
         check_not_forked()
         if self._state is None:
-            raise ResetNeeded("reset() must come before the first step()")
+            raise ResetNeeded("reset() must come first")
 
     def _masks(self):
         """(num_envs, actions) bool, or (actions,) of one spacecraft."""
