@@ -22,8 +22,8 @@ class SlewEnv(Task, gymnasium.Env):
 
     Observations are Eq. 11, (11,) float32; actions are rows of Table 1. ``info`` holds NumPy
     scalars that describe the spacecraft after the step: ``score``, the reward of Eq. 12–13,
-    ``success_rate`` and ``overspeed_rate``, 0 or 1, ``terminal_error_deg``; and ``is_success``,
-    which is true or false.
+    ``success_rate`` and ``overspeed_rate``, 0 or 1, ``terminal_error_deg``, and ``is_success``, the
+    success rate by the name that Stable-Baselines3 logs.
 
     The time limit is one: that of ``gymnasium.make(max_episode_steps=...)``, or of any other
     ``gymnasium.wrappers.TimeLimit``, takes the place of the task's own, and the last reward is
@@ -103,7 +103,6 @@ class SlewEnv(Task, gymnasium.Env):
         )
         self._record()
         info = {name: np.asarray(x)[()] for name, x in info.items()}
-        info["is_success"] = bool(info["is_success"])  # Gymnasium's vectors batch no NumPy booleans
         return np.array(observation), float(reward), bool(terminated), bool(truncated), info
 
     def action_masks(self):

@@ -99,7 +99,7 @@ def step_batch_later_reset(env, params, key, states, actions, ended):
 
 def _described(info):
     outcome = info["outcome"]
-    return {"score": info["score"], "is_success": outcome["success_rate"] > 0, **outcome}
+    return {"score": info["score"], "is_success": outcome["success_rate"], **outcome}
 
 
 def _single(x):

@@ -77,16 +77,15 @@ def test_info_has_success_and_scalars_of_numpy():
     rewards_at_the_goal(env)
     env.reset(seed=0)
     *_, info = env.step(1)
-    assert info["is_success"] is False and info["success_rate"] == 0
-    assert {type(x) for name, x in info.items() if name != "is_success"} == {np.float32}
+    assert info["is_success"] == info["success_rate"] == 0
+    assert {type(x) for x in info.values()} == {np.float32}
     envs = gymnasium.make_vec(ID, 2, max_episode_steps=1)
     envs.reset(seed=0)
     envs.unwrapped._state = envs.unwrapped._state.replace(
         quaternion=jnp.array([[0.0, 0, 0, 1], [1.0, 0, 0, 0]])
     )
     final = envs.step(np.zeros(2, int))[-1]["final_info"]
-    assert final["is_success"].tolist() == [True, False]
-    assert final["is_success"].dtype == bool and final["success_rate"].tolist() == [1, 0]
+    assert final["is_success"].tolist() == final["success_rate"].tolist() == [1, 0]
 
 
 @pytest.mark.parametrize("margin", [0.5, 0.99])

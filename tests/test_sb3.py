@@ -30,7 +30,7 @@ def test_infos_at_the_end_are_those_that_sb3_reads(time_limit_terminates):
     assert ended.all() and rewards.dtype == np.float32 and rewards.flags.writeable
     for i, info in enumerate(infos):
         assert info["TimeLimit.truncated"] == (not time_limit_terminates)
-        assert info["is_success"] is np.False_ and info["terminal_error_deg"] > 1
+        assert info["is_success"] == 0 and info["terminal_error_deg"] > 1
         assert "final_obs" not in info and "final_info" not in info
         # it has hardly turned from the start, but was kicked; the new episode is at rest
         np.testing.assert_allclose(info["terminal_observation"][:4], first[i][:4], atol=1e-3)
