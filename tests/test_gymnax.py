@@ -190,6 +190,40 @@ def test_evosaxs_problem_flies_a_population():
     assert fitness.shape == (3,) and jnp.all(jnp.isfinite(fitness))
 
 
+def test_stoas_adapter_steps():
+    """Stoix's environments go through stoa, which unpacks five values."""
+    stoa = pytest.importorskip("stoa.env_adapters.gymnax")
+    env = stoa.GymnaxToStoa(FiveValueEnv(AttitudeEnv(20)))
+    assert env.action_space().num_values == 19 and env.observation_space().shape == (11,)
+    state, first = jax.jit(env.reset)(KEY)
+    _, after = jax.lax.scan(lambda state, _: env.step(state, 0), state, length=500)
+    assert first.observation.shape == (11,) and after.reward.shape == (500,)
+    assert after.discount[-1] == 0 and jnp.all(after.discount[:-1] == 1)
+
+
+def test_a_loop_of_purejaxrls_kind_counts_its_episodes():
+    """A client of our own, with the calls that PureJaxRL's PPO makes on an environment."""
+    env, count = FiveValueEnv(AttitudeEnv(20), 0.01), 4
+    params = short(env, 6)
+    assert env.observation_space(params).shape == (11,) and env.action_space(params).n == 19
+    observations, states = jax.vmap(env.reset, (0, None))(jax.random.split(KEY, count), params)
+
+    def step(carry, key):
+        observations, states, lengths = carry
+        keys = jax.random.split(key, count)
+        actions = jax.random.randint(key, (count,), 0, env.action_space(params).n)
+        observations, states, rewards, done, info = jax.vmap(env.step, (0, 0, 0, None))(
+            keys, states, actions, params
+        )
+        lengths += 1
+        return (observations, states, jnp.where(done, 0, lengths)), (rewards, done, lengths)
+
+    carry = observations, states, jnp.zeros(count, int)
+    _, (rewards, done, lengths) = jax.lax.scan(step, carry, jax.random.split(KEY, 13))
+    assert done.sum() == 2 * count and jnp.all(lengths[done] == 6)
+    assert jnp.all(jnp.isfinite(rewards))
+
+
 def test_rejaxs_ppo_learns():
     """Measured with keys 0 to 2: from -218, -233, -291 to -8, 40, -27."""
     rejax = pytest.importorskip("rejax")
