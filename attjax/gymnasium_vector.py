@@ -74,8 +74,8 @@ class SlewVectorEnv(Task, VectorEnv):
 
         Args:
             seed: an integer, of these and all later episodes; a list of one for each spacecraft,
-                whose start is that of a :class:`attjax.gymnasium_env.SlewEnv` of that seed; None, in
-                the list too, goes on as seeded before.
+                whose start is that of a :class:`attjax.gymnasium_env.SlewEnv` of that seed; None
+                goes on as seeded before, in the list too.
             options: ``{"reset_mask": (num_envs,) bool}`` resets only where it is true.
 
         Raises:
@@ -137,7 +137,7 @@ class SlewVectorEnv(Task, VectorEnv):
         return self._frames()
 
     def call(self, name, *args, **kwargs):
-        """A method's result, or an attribute, for each spacecraft; as of Gymnasium's own vectors."""
+        """A method's result, or an attribute, for each spacecraft, as Gymnasium's own vectors."""
         value = getattr(self, name)
         value = value(*args, **kwargs) if callable(value) else value
         return tuple(value) if name in EACH_ITS_OWN else (value,) * self.num_envs
@@ -150,8 +150,9 @@ class SlewVectorEnv(Task, VectorEnv):
         if not options:
             return None
         mask = options.get("reset_mask")
-        fits = isinstance(mask, np.ndarray) and mask.dtype == bool and mask.shape == (self.num_envs,)
-        if set(options) != {"reset_mask"} or not (fits and mask.any()):
+        fits = isinstance(mask, np.ndarray) and mask.dtype == bool
+        fits = fits and mask.shape == (self.num_envs,) and mask.any()
+        if set(options) != {"reset_mask"} or not fits:
             raise ValueError(
                 f"options is {options!r}; it must be {{'reset_mask': an array of {self.num_envs} "
                 f"booleans, not all false}}"

@@ -126,7 +126,7 @@ class Renderer:
 
 
 def box(inertia) -> np.ndarray:
-    """(3,) half the edges of the homogeneous box, of largest edge 2, that turns as the body does."""
+    """(3,) half the edges of the homogeneous box, largest edge 2, that turns as the body does."""
     inertia = np.asarray(inertia, float)
     moments = inertia if inertia.ndim == 1 else np.diag(inertia)
     squares = np.maximum(np.sum(moments) - 2 * moments, 0.05 * np.max(moments))
@@ -136,8 +136,9 @@ def box(inertia) -> np.ndarray:
 def rotation(quaternion) -> np.ndarray:
     """(3, 3) matrix from the body's frame to the goal attitude's, of (4,) scalar last."""
     x, y, z, w = quaternion / np.linalg.norm(quaternion)
-    return np.array([
+    rows = (
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])
+    )
+    return np.array(rows)

@@ -82,8 +82,10 @@ class GymnasiumVecEnv(VecEnv):
     def get_attr(self, attr_name, indices=None):
         """The vector's attribute, once for each environment, or each environment's own."""
         vector = self.vector_env.unwrapped
-        shared = hasattr(vector, attr_name) or not hasattr(vector, "get_attr")
-        values = [getattr(vector, attr_name)] * self.num_envs if shared else vector.get_attr(attr_name)
+        if not hasattr(vector, attr_name) and hasattr(vector, "get_attr"):
+            values = vector.get_attr(attr_name)
+        else:
+            values = [getattr(vector, attr_name)] * self.num_envs
         return [values[i] for i in self._get_indices(indices)]
 
     def set_attr(self, attr_name, value, indices=None):

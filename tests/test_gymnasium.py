@@ -193,7 +193,7 @@ def test_other_bad_arguments_are_refused():
             make().reset(options={"reset_mask": None})
         with pytest.raises(ValueError, match="render_mode is 'human'; it must be None or 'rgb_arr"):
             make(render_mode="human")
-        with pytest.raises(ValueError, match="rate_margin is 1.5; it must be above 0"):
+        with pytest.raises(ValueError, match=r"rate_margin is 1\.5; it must be above 0"):
             make(rate_margin=1.5)
     for num_envs in (0, -1, 2.5, None):
         with pytest.raises(ValueError, match=f"num_envs is {num_envs}; it must be a positive int"):

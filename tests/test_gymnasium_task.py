@@ -18,7 +18,6 @@ from attjax import AttitudeEnv, networks, observation  # noqa: E402
 from attjax.gymnasium_env import ID, SlewEnv  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("error")
-AT_GOAL = {"quaternion": [0.0, 0.0, 0.0, 1.0], "angular_velocity": [0.0, 0.0, 0.0]}
 LIMITED = {
     "make": lambda n: gymnasium.make(ID, max_episode_steps=n),
     "by hand": lambda n: TimeLimit(TimeLimit(SlewEnv(), n), n + 5),
@@ -35,8 +34,10 @@ def rewards_at_the_goal(env):
     """Rewards of one spacecraft that is at rest at the goal from its start."""
     env.reset(seed=0)
     task = env.unwrapped.envs[0].unwrapped if hasattr(env.unwrapped, "envs") else env.unwrapped
+    shape = task._state.time.shape
     task._state = task._state.replace(
-        **{name: jnp.array(x).reshape(getattr(task._state, name).shape) for name, x in AT_GOAL.items()}
+        quaternion=jnp.broadcast_to(jnp.array([0.0, 0.0, 0.0, 1.0]), (*shape, 4)),
+        angular_velocity=jnp.zeros((*shape, 3)),
     )
     rewards, ended = [], False
     while not ended:

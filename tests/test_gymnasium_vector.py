@@ -46,7 +46,7 @@ def test_the_steps_around_an_episodes_end_are_those_of_gymnasiums_own(mode):
     )
     same_starts(ours, theirs)
     saw = []
-    for step in range(12):
+    for _ in range(12):
         actions = np.array([0, 1, 7])
         a, b = ours.step(actions), theirs.step(actions)
         ended = a[2] | a[3]
@@ -123,7 +123,7 @@ def test_a_mask_resets_only_where_it_says():
     envs = gymnasium.make_vec(ID, 3, autoreset_mode="Disabled", max_episode_steps=2)
     with pytest.raises(ResetNeeded):
         envs.reset(options={"reset_mask": np.ones(3, bool)})
-    first, _ = envs.reset(seed=0)
+    envs.reset(seed=0)
     envs._state = envs._state.replace(time=jnp.array([1, 0, 0], jnp.int32))
     before = envs.step(np.ones(3, int))
     assert before[3].tolist() == [True, False, False]
@@ -158,7 +158,7 @@ def test_a_mask_resets_only_where_it_says():
 def test_other_options_are_refused(options):
     envs = gymnasium.make_vec(ID, 2)
     envs.reset(seed=0)
-    with pytest.raises(ValueError, match=r"options is .*; it must be \{'reset_mask': an array of 2"):
+    with pytest.raises(ValueError, match=r"options is .*; it must be \{'reset_mask': an array"):
         envs.reset(options=options)
 
 

@@ -212,7 +212,7 @@ def test_a_loop_of_purejaxrls_kind_counts_its_episodes():
         observations, states, lengths = carry
         keys = jax.random.split(key, count)
         actions = jax.random.randint(key, (count,), 0, env.action_space(params).n)
-        observations, states, rewards, done, info = jax.vmap(env.step, (0, 0, 0, None))(
+        observations, states, rewards, done, _ = jax.vmap(env.step, (0, 0, 0, None))(
             keys, states, actions, params
         )
         lengths += 1

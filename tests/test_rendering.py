@@ -79,7 +79,9 @@ def test_the_heights_of_the_curves_are_those_of_error_and_rate():
     assert small_error > large_error + 20 and small_rate > large_rate + 20
 
 
-@pytest.mark.parametrize("inertia", [[1.0, 1, 1], [1.0, 0.5, 0.5], [[2.0, 0.3, 0], [0.3, 1, 0], [0, 0, 2]]])
+@pytest.mark.parametrize(
+    "inertia", [[1.0, 1, 1], [1.0, 0.5, 0.5], [[2, 0.3, 0], [0.3, 1, 0], [0, 0, 2]]]
+)
 def test_other_bodies_are_drawn_too(inertia):
     drawn = renderer(inertia)
     drawn.record(GOAL, REST, np.array([0]))

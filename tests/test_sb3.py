@@ -89,9 +89,7 @@ def test_each_environment_has_its_own_mask(how):
     same_step = {"autoreset_mode": "SameStep"}
     vec_env = {
         "as_vec_env": lambda: as_vec_env(make_vec(3)),
-        "sync": lambda: as_vec_env(
-            make_vec(3, vectorization_mode="sync", vector_kwargs=same_step)
-        ),
+        "sync": lambda: as_vec_env(make_vec(3, vectorization_mode="sync", vector_kwargs=same_step)),
         "DummyVecEnv": lambda: DummyVecEnv([lambda: gymnasium.make(ID)] * 3),
     }[how]()
     assert how == "sync" or vec_env.has_attr("action_masks")
