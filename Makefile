@@ -35,7 +35,7 @@ test-all:
 TORCH ?= torch
 CUDA ?=
 TORCH_CLIENTS := stable-baselines3 sb3-contrib sbx-rl tianshou torchrl skrl
-PIP_INSTALL = $(@D)/bin/python -m pip install --quiet --disable-pip-version-check
+PIP = $(@D)/bin/python -m pip --disable-pip-version-check
 
 test-peers: $(VENV)-gym/installed $(VENV)-rejax/installed
 	$(VENV)-gym/bin/python -m pytest tests/test_gymnasium*.py tests/test_rendering.py \
@@ -46,17 +46,17 @@ test-peers: $(VENV)-gym/installed $(VENV)-rejax/installed
 
 $(VENV)-gym/installed: pyproject.toml
 	$(PYTHON) -m venv $(@D)
-	$(PIP_INSTALL) --editable '.[test,gym]' 'gymnasium[other]' pygame
-	if [ -z "$(CUDA)" ] && $(@D)/bin/python -m pip install --dry-run $(TORCH) | grep -q nvidia; then \
+	$(PIP) --quiet install --editable '.[test,gym]' 'gymnasium[other]' pygame
+	if [ -z "$(CUDA)" ] && $(PIP) install --dry-run $(TORCH) | grep -q nvidia; then \
 	    echo "left out: PyTorch, which here would bring CUDA, and its clients; see the Makefile"; \
 	else \
-	    $(PIP_INSTALL) $(TORCH) && $(PIP_INSTALL) $(TORCH_CLIENTS); \
+	    $(PIP) --quiet install $(TORCH) $(TORCH_CLIENTS); \
 	fi
 	touch $@
 
 $(VENV)-rejax/installed: pyproject.toml
 	$(PYTHON) -m venv $(@D)
-	$(PIP_INSTALL) --editable '.[test]' gymnax rejax evosax brax stoa-env
+	$(PIP) --quiet install --editable '.[test]' gymnax rejax evosax brax stoa-env
 	touch $@
 
 lint: setup
