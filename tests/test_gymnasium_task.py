@@ -139,7 +139,7 @@ def python(code, tmp_path=None):
         [sys.executable, "-W", "ignore", *where],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         env={"PYTHONPATH": str(ROOT), "PATH": "", "JAX_PLATFORMS": "cpu"},
     )
 
