@@ -28,19 +28,35 @@ test-all:
 	    fi; \
 	done
 
-# Gymnasium and Stable-Baselines3, then gymnax and rejax: each pair where its own pins fit. PyTorch's
-# default Linux wheels hold CUDA; PIP_EXTRA_INDEX_URL can name an index of smaller ones.
-test-peers: $(VENV)-gym/installed $(VENV)-rejax/installed
-	$(VENV)-gym/bin/python -m pytest tests/test_gymnasium.py tests/test_sb3.py \
-	    tests/test_docs.py::test_python_runs attjax/gymnasium_env.py attjax/sb3.py $(ARGS)
-	$(VENV)-rejax/bin/python -m pytest tests/test_gymnax.py tests/test_gymnasium.py \
-	    tests/test_docs.py::test_python_runs attjax/gymnax_compat.py $(ARGS)
+# The libraries of docs/peers.md: those on Gymnasium, then those on gymnax; each group where its own
+# pins fit. PyTorch's wheels for Linux bring 2.3 GB of CUDA. Where pip would take those, it is left
+# out, with what needs it. An index of CPU builds can be named by PIP_EXTRA_INDEX_URL, or a build by
+# TORCH (as TORCH=torch==2.13.0 where pip finds a CPU build of that); CUDA=1 takes what there is.
+TORCH ?= torch
+CUDA ?=
+TORCH_CLIENTS := stable-baselines3 sb3-contrib sbx-rl tianshou torchrl skrl
+PIP = $(@D)/bin/python -m pip --disable-pip-version-check
 
-$(VENV)-gym/installed: PACKAGES = '.[test,gym]' torch stable-baselines3
-$(VENV)-rejax/installed: PACKAGES = '.[test]' gymnax rejax
-$(VENV)-gym/installed $(VENV)-rejax/installed: pyproject.toml
+test-peers: $(VENV)-gym/installed $(VENV)-rejax/installed
+	$(VENV)-gym/bin/python -m pytest tests/test_gymnasium*.py tests/test_rendering.py \
+	    tests/test_sb3.py tests/test_clients.py tests/test_docs.py::test_python_runs \
+	    attjax/gymnasium_env.py attjax/gymnasium_vector.py attjax/sb3.py $(ARGS)
+	$(VENV)-rejax/bin/python -m pytest tests/test_gymnax.py tests/test_docs.py::test_python_runs \
+	    attjax/gymnax_compat.py $(ARGS)
+
+$(VENV)-gym/installed: pyproject.toml
 	$(PYTHON) -m venv $(@D)
-	$(@D)/bin/python -m pip install --quiet --disable-pip-version-check --editable $(PACKAGES)
+	$(PIP) --quiet install --editable '.[test,gym]' 'gymnasium[other]' pygame
+	if [ -z "$(CUDA)" ] && $(PIP) install --dry-run $(TORCH) | grep -q nvidia; then \
+	    echo "left out: PyTorch, which here would bring CUDA, and its clients; see the Makefile"; \
+	else \
+	    $(PIP) --quiet install $(TORCH) $(TORCH_CLIENTS); \
+	fi
+	touch $@
+
+$(VENV)-rejax/installed: pyproject.toml
+	$(PYTHON) -m venv $(@D)
+	$(PIP) --quiet install --editable '.[test]' gymnax rejax evosax brax stoa-env
 	touch $@
 
 # The tests are tried on broken code; ARGS='--modules losses reward' for a part of it.

@@ -67,13 +67,15 @@ def integer(name: str, x, low: int, high: int):
 
 
 def action(x, count: int) -> int:
-    """Return x as an integer from 0 to count − 1, for steps from Python.
+    """Return x, or the one element of an array, as an integer from 0 to count − 1.
+
+    For steps from Python.
 
     Raises:
         ValueError: it is something else.
     """
     try:
-        x = operator.index(x)
+        x = operator.index(x.reshape(())[()] if getattr(x, "shape", ()) == (1,) else x)
     except TypeError:
         raise ValueError(f"action is {x!r}; it must be an integer") from None
     if not 0 <= x < count:

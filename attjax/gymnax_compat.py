@@ -17,9 +17,13 @@ from attjax.env import AttitudeEnv
 class GymnaxEnv(environment.Environment):
     """The environment as one of gymnax 1.0.
 
+    ``info`` is what gymnax's own environments tell, ``terminated``, ``truncated``, ``discount``
+    and, after ``step``, ``final_observation``: as much as Brax's state has room for after a reset.
+
     Args:
         env: by default the paper's, ``AttitudeEnv()``.
         reward_scale: factor of the reward.
+        describe: whether ``info`` holds ``score`` and ``outcome`` of the environment too.
 
     Example:
         >>> env = GymnaxEnv()
@@ -27,15 +31,23 @@ class GymnaxEnv(environment.Environment):
         Discrete(19, dtype=int32)
     """
 
-    def __init__(self, env: AttitudeEnv | None = None, reward_scale: float = 1.0):
+    def __init__(
+        self,
+        env: AttitudeEnv | None = None,
+        reward_scale: float = 1.0,
+        describe: bool = False,
+    ):
         super().__init__()
         self.attitude_env = AttitudeEnv() if env is None else env
         self.reward_scale = reward_scale
+        self.describe = describe
 
     @property
     def default_params(self):
-        """As the environment's."""
-        return self.attitude_env.default_params
+        """As the environment's, with a plain integer for the time limit: evosax hashes it."""
+        env = self.attitude_env
+        limit = env.spacecraft.max_steps(env.frameskip)
+        return env.default_params.replace(max_steps_in_episode=limit)
 
     @property
     def name(self) -> str:
@@ -50,13 +62,20 @@ class GymnaxEnv(environment.Environment):
     @functools.partial(jax.jit, static_argnames="self")
     def step(self, key, state, action, params=None):
         """As the environment's: six values."""
-        observation, state, reward, *rest = self.attitude_env.step(key, state, action, params)
-        return observation, state, reward * self.reward_scale, *rest
+        *results, info = self.attitude_env.step(key, state, action, params)
+        return self._told(*results, info=info)
 
     def step_env(self, key, state, action, params):
-        """As the environment's."""
-        observation, state, reward, *rest = self.attitude_env.step_env(key, state, action, params)
-        return observation, state, reward * self.reward_scale, *rest
+        """As the environment's: five values."""
+        *results, info = self.attitude_env.step_env(key, state, action, params)
+        return self._told(*results, info=info)
+
+    def _told(self, observation, state, reward, *ends, info):
+        terminated = info["terminated"]
+        info = {**info, "discount": 1 - terminated.astype(reward.dtype)}
+        if not self.describe:
+            del info["score"], info["outcome"]
+        return observation, state, reward * self.reward_scale, *ends, info
 
     def reset_env(self, key, params):
         """As the environment's."""

@@ -32,13 +32,19 @@ def step(env, params, state, action):
     return state, (_single(observation), reward, terminated, info["truncated"], _described(info))
 
 
-@functools.partial(jax.jit, static_argnames=("env", "num_envs"))
-def reset_batch(env, params, key, num_envs):
-    """Start all episodes. Returns a key for :func:`step_batch`, the observations, the states."""
-    key, reset_key = jax.random.split(key)
-    keys = jax.random.split(reset_key, num_envs)
+@functools.partial(jax.jit, static_argnames="env")
+def reset_batch(env, params, keys):
+    """Start an episode for each key. Returns the observations and the states."""
     observations, states = jax.vmap(env.reset, (0, None))(keys, params)
-    return key, _single(observations), states
+    return _single(observations), states
+
+
+@jax.jit
+def choose(mask, new, old):
+    """The rows of one pytree where the mask (batch,) says so, else those of another."""
+    return jax.tree.map(
+        lambda a, b: jnp.where(mask.reshape(-1, *[1] * (a.ndim - 1)), a, b), new, old
+    )
 
 
 @functools.partial(
@@ -62,8 +68,38 @@ def step_batch(env, params, key, states, actions):
     return key, states, (*final, _single(observations), rewards, terminated, truncated)
 
 
+@functools.partial(
+    jax.jit,
+    static_argnames="env",
+    donate_argnames="states",
+    compiler_options=vector.COMPILER_OPTIONS,
+)
+def step_batch_later_reset(env, params, key, states, actions, ended):
+    """One agent step of the spacecraft that have not ended, and a new episode for the others.
+
+    Args:
+        env, params, key, states, actions: as for :func:`step_batch`; the states are donated.
+        ended: (batch,) bool, whose episode ended in the step before.
+
+    Returns:
+        The next key, the states, and what describes the spacecraft after the step, observations,
+        rewards, terminated, truncated; the last three are 0 where ``ended``.
+    """
+    key, step_key, reset_key = jax.random.split(key, 3)
+    step_keys = jax.random.split(step_key, len(actions))
+    observations, states, *results, info = jax.vmap(env.step_env, (0, 0, 0, None))(
+        step_keys, states, actions, params
+    )
+    observations, states = vector.restart(
+        lambda key, _: env.reset(key, params), reset_key, ended, (observations, states)
+    )
+    results = [jnp.where(ended, jnp.zeros_like(x), x) for x in (*results, info["truncated"])]
+    return key, states, (_described(info), _single(observations), *results)
+
+
 def _described(info):
-    return {"score": info["score"], **info["outcome"]}
+    outcome = info["outcome"]
+    return {"score": info["score"], "is_success": outcome["success_rate"], **outcome}
 
 
 def _single(x):

@@ -29,9 +29,9 @@ def as_vec_env(
 class GymnasiumVecEnv(VecEnv):
     """What :func:`as_vec_env` returns.
 
-    At an episode's end the info of its environment has ``terminal_observation``,
-    ``TimeLimit.truncated`` (false where the time limit is learned as an end) and, where the
-    environment tells it, ``is_success``, which Stable-Baselines3 logs.
+    Each environment's info is the vector's of that step; where an episode ended, the ended one's,
+    with ``terminal_observation`` and ``TimeLimit.truncated`` (false where the time limit is
+    learned as an end). attjax's holds ``is_success``, which Stable-Baselines3 logs.
     """
 
     def __init__(self, vector_env, reward_scale, time_limit_terminates):
@@ -49,7 +49,8 @@ class GymnasiumVecEnv(VecEnv):
 
     def reset(self):
         """Start all episodes; observations (num_envs, ...). The first environment's seed rules."""
-        observations, _ = self.vector_env.reset(seed=self._seeds[0])
+        observations, info = self.vector_env.reset(seed=self._seeds[0])
+        self.reset_infos = _unstacked(info, self.num_envs)
         self._reset_seeds()
         return observations
 
@@ -60,35 +61,61 @@ class GymnasiumVecEnv(VecEnv):
     def step_wait(self):
         """Observations, rewards (num_envs,), ends (num_envs,) and a list of infos."""
         observations, rewards, terminated, truncated, info = self.vector_env.step(self._actions)
-        infos = [{} for _ in range(self.num_envs)]
         ended = terminated | truncated
-        final_info = info.get("final_info", {})
+        infos = _unstacked(info, self.num_envs)
         for i in np.flatnonzero(ended):
-            infos[i]["terminal_observation"] = info["final_obs"][i]
+            infos[i] |= infos[i].pop("final_info", {})
+            infos[i]["terminal_observation"] = infos[i].pop("final_obs")
             infos[i]["TimeLimit.truncated"] = bool(
                 truncated[i] and not terminated[i] and not self.time_limit_terminates
             )
-            if "success_rate" in final_info:
-                infos[i]["is_success"] = bool(final_info["success_rate"][i])
         return observations, rewards * self.reward_scale, ended, infos
 
     def close(self):
         """Close the vector."""
         self.vector_env.close()
 
+    def get_images(self):
+        """A picture of each environment, where the vector was made with a render mode."""
+        return list(self.vector_env.render())
+
     def get_attr(self, attr_name, indices=None):
-        """The vector's attribute, once for each environment."""
-        return [getattr(self.vector_env, attr_name) for _ in self._get_indices(indices)]
+        """The vector's attribute, once for each environment, or each environment's own."""
+        vector = self.vector_env.unwrapped
+        if not hasattr(vector, attr_name) and hasattr(vector, "get_attr"):
+            values = vector.get_attr(attr_name)
+        else:
+            values = [getattr(vector, attr_name)] * self.num_envs
+        return [values[i] for i in self._get_indices(indices)]
 
     def set_attr(self, attr_name, value, indices=None):
-        """Set the vector's attribute, which all environments share."""
-        setattr(self.vector_env, attr_name, value)
+        """Set the vector's attribute, which all environments share.
+
+        Raises:
+            ValueError: the indices leave some out.
+        """
+        if len(set(self._get_indices(indices))) < self.num_envs:
+            raise ValueError(f"indices is {indices!r}; all environments share {attr_name}")
+        setattr(self.vector_env.unwrapped, attr_name, value)
 
     def env_method(self, method_name, *method_args, indices=None, **method_kwargs):
-        """The result of the vector's method, once for each environment."""
-        result = getattr(self.vector_env, method_name)(*method_args, **method_kwargs)
-        return [result for _ in self._get_indices(indices)]
+        """The result of each environment's method, as the vector's own ``call`` gives it."""
+        results = self.vector_env.unwrapped.call(method_name, *method_args, **method_kwargs)
+        return [results[i] for i in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class, indices=None):
         """No environment is."""
         return [False for _ in self._get_indices(indices)]
+
+
+def _unstacked(info, num_envs):
+    """A Gymnasium vector's info as a list of one for each environment."""
+    infos = [{} for _ in range(num_envs)]
+    for name, values in info.items():
+        if (mask := info.get(f"_{name}")) is None:
+            continue  # a mask itself
+        if isinstance(values, dict):
+            values = _unstacked(values, num_envs)
+        for i in np.flatnonzero(mask):
+            infos[i][name] = values[i]
+    return infos

@@ -15,6 +15,9 @@ import attjax
 
 PEERS = {
     "gymnasium_env": ["gymnasium"],
+    "gymnasium_vector": ["gymnasium"],
+    "gymnasium_task": ["gymnasium"],
+    "rendering": ["matplotlib"],
     "sb3": ["gymnasium", "stable_baselines3"],
     "gymnax_compat": ["gymnax"],
     "export_stablehlo": ["flatbuffers"],

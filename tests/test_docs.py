@@ -22,7 +22,7 @@ INDEX = Page(ROOT / "docs" / "README.md")
 PAGES = [README, *(Page(path) for path in sorted((ROOT / "docs").rglob("*.md")))]
 LINKING = [*PAGES, *(Page(path) for path in ROOT.glob("*.md") if path != README.path)]
 LANGUAGES = {COMMANDS, "python", "text", "toml", "c", "json"}
-PEERS = ("gymnasium", "stable_baselines3", "gymnax", "rejax")
+PEERS = ("gymnasium", "stable_baselines3", "sb3_contrib", "gymnax", "rejax", "evosax")
 
 
 def name(page):

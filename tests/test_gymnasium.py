@@ -60,7 +60,7 @@ def test_a_vector_steps_as_gymnasiums_own_vector_of_single_ones():
     theirs.reset(seed=1)
     for i, env in enumerate(theirs.envs):
         # a state apart: each is donated to the program that steps it
-        env.unwrapped._state = jax.tree.map(lambda x, i=i: jnp.array(x[i]), ours._states)
+        env.unwrapped._state = jax.tree.map(lambda x, i=i: jnp.array(x[i]), ours._state)
     for step in range(4):
         actions = np.array([0, 1, 7 + step])
         a, b = ours.step(actions), theirs.step(actions)
@@ -97,7 +97,7 @@ def test_final_observations_are_kept_where_an_episode_ended():
         angular_velocity=jnp.array([[0.0, 0, 0], [0.51, 0, 0], [0.0, 0, 0]]),
         time=jnp.array([1, 10, 49], jnp.int32),
     )
-    envs._states = fast
+    envs._state = fast
     observations, rewards, terminated, truncated, info = envs.step(np.zeros(3, int))
     assert terminated.tolist() == [False, True, False]
     assert truncated.tolist() == [False, False, True]
@@ -105,7 +105,7 @@ def test_final_observations_are_kept_where_an_episode_ended():
     assert info["_final_obs"].tolist() == [False, True, True]
     assert info["final_obs"][0] is None
     assert info["final_obs"][1][8] == pytest.approx(0.51, abs=1e-6)
-    assert observations[1][8] == 0 and envs._states.time.tolist() == [2, 0, 0]
+    assert observations[1][8] == 0 and envs._state.time.tolist() == [2, 0, 0]
     assert info["final_info"]["success_rate"].tolist() == [0, 0, 1]
     assert info["final_info"]["overspeed_rate"].tolist() == [0, 1, 0]
 
@@ -159,7 +159,15 @@ def test_float64_is_told_to_gymnasium_as_float32(x64):
     assert env.step(np.zeros(2, int))[0] in env.observation_space
 
 
-@pytest.mark.parametrize("action", [-1, 19, 0.5, None, np.array([1, 2])])
+@pytest.mark.parametrize("action", [3, np.int32(3), np.array(3), np.array([3]), jnp.array([3])])
+def test_an_action_is_an_integer_or_an_array_that_holds_one(action):
+    env, same = SlewEnv(), SlewEnv()
+    env.reset(seed=0)
+    same.reset(seed=0)
+    np.testing.assert_array_equal(env.step(action)[0], same.step(3)[0])
+
+
+@pytest.mark.parametrize("action", [-1, 19, 0.5, None, np.array([1, 2]), np.array([0.5])])
 def test_actions_out_of_the_space_are_refused(action):
     env = SlewEnv()
     env.reset(seed=0)
@@ -194,12 +202,20 @@ def test_other_bad_arguments_are_refused():
             make().step(0)
         with pytest.raises(ValueError, match="options is"):
             make().reset(options={"reset_mask": None})
-    with pytest.raises(ValueError, match="num_envs is 0"):
-        SlewVectorEnv(0)
+        with pytest.raises(ValueError, match="render_mode is 'human'; it must be None or 'rgb_arr"):
+            make(render_mode="human")
+        with pytest.raises(ValueError, match=r"rate_margin is 1\.5; it must be above 0"):
+            make(rate_margin=1.5)
+    for num_envs in (0, -1, 2.5, None):
+        with pytest.raises(ValueError, match=f"num_envs is {num_envs}; it must be a positive int"):
+            SlewVectorEnv(num_envs)
     with pytest.raises(ValueError, match="max_steps_in_episode is 0; it must be from 1"):
         SlewVectorEnv(2, max_episode_steps=0)
-    with pytest.raises(ValueError, match="seed is"):
-        SlewVectorEnv(2).reset(seed=[1, 2])
+    for seed in ([1, 2, 3], "ab", 0.5, [1, 0.5]):
+        with pytest.raises(ValueError, match=r"seed is .*; it must be an integer, or a list of 2"):
+            SlewVectorEnv(2).reset(seed=seed)
+    with pytest.raises(ValueError, match="autoreset_mode is 'never'; it must be 'NextStep', "):
+        SlewVectorEnv(2, autoreset_mode="never")
 
 
 def test_an_environment_of_ones_own():

@@ -132,6 +132,98 @@ def test_five_values_tell_both_ends_as_done():
     assert done and reward == pytest.approx(-5)
 
 
+def test_the_time_limit_of_the_default_is_hashable():
+    params = GymnaxEnv(AttitudeEnv(5)).default_params
+    assert hash(params.max_steps_in_episode) == hash(1750)
+    observation, state = GymnaxEnv(AttitudeEnv(5)).reset(KEY, params)
+    np.testing.assert_array_equal(observation, AttitudeEnv(5).reset(KEY)[0])
+    assert not GymnaxEnv(AttitudeEnv(5)).step(KEY, state, 1)[4]
+
+
+def test_info_is_gymnaxs_own_unless_more_is_asked_for():
+    own = {"terminated", "truncated", "discount"}
+    for describe, more in ((False, set()), (True, {"score", "outcome"})):
+        env = GymnaxEnv(describe=describe)
+        _, state = env.reset(KEY)
+        fast = state.replace(angular_velocity=jnp.array([0.6, 0.0, 0.0]))
+        for start, discount in ((state, 1), (fast, 0)):
+            info = env.step_env(KEY, start, 1, env.default_params)[-1]
+            assert set(info) == own | more and info["discount"] == discount
+            assert set(env.step(KEY, start, 1)[-1]) == own | more | {"final_observation"}
+
+
+@needs_six
+def test_braxs_wrapper_keeps_one_structure():
+    training = pytest.importorskip("brax.envs.wrappers.training")
+    brax = pytest.importorskip("gymnax.wrappers.brax")
+    env = brax.GymnaxToBraxWrapper(GymnaxEnv(AttitudeEnv(20)))
+    start = jax.jit(env.reset)(KEY)
+    end, rewards = jax.lax.scan(
+        lambda state, _: (lambda new: (new, new.reward))(env.step(state, 1)), start, length=5
+    )
+    assert jax.tree.structure(end) == jax.tree.structure(start)
+    assert end.pipeline_state.time == 5 and rewards.shape == (5,)
+    episodes = training.EpisodeWrapper(env, episode_length=10, action_repeat=3)
+    state = jax.jit(episodes.step)(jax.jit(episodes.reset)(KEY), jnp.array(1))
+    assert state.info["steps"] == 3
+
+
+@needs_six
+def test_evosaxs_problem_flies_a_population():
+    rl = pytest.importorskip("evosax.problems.rl.gymnax")
+    from flax import linen
+
+    class Linear(linen.Module):
+        @linen.compact
+        def __call__(self, x, key):
+            return jnp.argmax(linen.Dense(19)(x), axis=-1)
+
+    if "AttjaxSlew" not in gymnax.registered_envs:
+        gymnax.register("AttjaxSlew", GymnaxEnv)
+    policy = Linear()
+    problem = rl.GymnaxProblem("AttjaxSlew", policy, num_rollouts=2)
+    population = jax.vmap(policy.init, (0, None, None))(
+        jax.random.split(KEY, 3), jnp.zeros(11), KEY
+    )
+    fitness, _, _ = problem.eval(KEY, population, problem.init(KEY))
+    assert problem.episode_length == 500
+    assert fitness.shape == (3,) and jnp.all(jnp.isfinite(fitness))
+
+
+def test_stoas_adapter_steps():
+    """Stoix's environments go through stoa, which unpacks five values."""
+    stoa = pytest.importorskip("stoa.env_adapters.gymnax")
+    env = stoa.GymnaxToStoa(FiveValueEnv(AttitudeEnv(20)))
+    assert env.action_space().num_values == 19 and env.observation_space().shape == (11,)
+    state, first = jax.jit(env.reset)(KEY)
+    _, after = jax.lax.scan(lambda state, _: env.step(state, 0), state, length=500)
+    assert first.observation.shape == (11,) and after.reward.shape == (500,)
+    assert after.discount[-1] == 0 and jnp.all(after.discount[:-1] == 1)
+
+
+def test_a_loop_of_purejaxrls_kind_counts_its_episodes():
+    """A client of our own, with the calls that PureJaxRL's PPO makes on an environment."""
+    env, count = FiveValueEnv(AttitudeEnv(20), 0.01), 4
+    params = short(env, 6)
+    assert env.observation_space(params).shape == (11,) and env.action_space(params).n == 19
+    observations, states = jax.vmap(env.reset, (0, None))(jax.random.split(KEY, count), params)
+
+    def step(carry, key):
+        observations, states, lengths = carry
+        keys = jax.random.split(key, count)
+        actions = jax.random.randint(key, (count,), 0, env.action_space(params).n)
+        observations, states, rewards, done, _ = jax.vmap(env.step, (0, 0, 0, None))(
+            keys, states, actions, params
+        )
+        lengths += 1
+        return (observations, states, jnp.where(done, 0, lengths)), (rewards, done, lengths)
+
+    carry = observations, states, jnp.zeros(count, int)
+    _, (rewards, done, lengths) = jax.lax.scan(step, carry, jax.random.split(KEY, 13))
+    assert done.sum() == 2 * count and jnp.all(lengths[done] == 6)
+    assert jnp.all(jnp.isfinite(rewards))
+
+
 def test_rejaxs_ppo_learns():
     """Measured with keys 0 to 2: from -218, -233, -291 to -8, 40, -27."""
     rejax = pytest.importorskip("rejax")

@@ -25,9 +25,11 @@ LAYERS = [
     {"dynamics"},
     {"spacecraft", "reward", "observation"},
     {"env"},
-    {"controllers", "gymnasium_env", "gymnax_compat"},
-    {"networks", "losses"},
-    {"learner", "evaluation"},
+    {"controllers", "gymnax_compat"},
+    {"networks", "losses", "rendering"},
+    {"learner", "evaluation", "gymnasium_task"},
+    {"gymnasium_vector"},
+    {"gymnasium_env"},
     {"rollout", "descent"},
     {"ppo"},
     {"presets", "assembly", "run_folder", "nan_search"},
@@ -39,7 +41,7 @@ LAYERS = [
 LEARNING = {"networks", "losses", "learner", "rollout", "descent", "ppo"}
 SPACECRAFT = {"spacecraft", "reward", "env"}
 PEERS = {"gymnasium", "gymnax", "rejax", "stable_baselines3", "torch"}
-FOR_PEERS = {"gymnasium_env", "gymnax_compat", "sb3"}
+FOR_PEERS = {"gymnasium_env", "gymnasium_vector", "gymnasium_task", "gymnax_compat", "sb3"}
 FOLDER = Path(attjax.__file__).parent
 
 

@@ -17,8 +17,8 @@ MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
 MODULES |= {"socket", "urllib", "http", "requests", "ftplib"}
 CORE = {"jax", "jaxlib", "flax", "optax", "chex", "numpy", "orbax-checkpoint", "rich"}
 IMPORTED = {name.removesuffix("-checkpoint") for name in CORE}
-FOR_EXTRAS = {"plots", "gymnasium_env", "sb3", "gymnax_compat", "export_onnx", "export_stablehlo"}
-FOR_EXTRAS |= {"tensorboard"}
+FOR_EXTRAS = {"plots", "rendering", "sb3", "gymnax_compat", "export_onnx", "export_stablehlo"}
+FOR_EXTRAS |= {"tensorboard", "gymnasium_task", "gymnasium_vector", "gymnasium_env"}
 CALLS = {"eval", "exec", "compile", "__import__"}
 
 
@@ -85,3 +85,10 @@ def test_training_and_evaluation_open_no_connection(tmp_path, monkeypatch):
     assert train_script.main([*TINY, "--total-steps", "1", "--tensorboard", *folder]) == 0
     arguments = ["--episodes", "2", "--duration", "1", "--device", "cpu"]
     assert eval_script.main([*arguments, *folder]) == 0
+
+
+def test_the_extra_leaves_out_gymnasiums_of_wrong_statistics():
+    """Up to 1.3, RecordEpisodeStatistics counts too few steps of vectors that reset at once."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    (gymnasium,) = map(Requirement, project["optional-dependencies"]["gym"])
+    assert not gymnasium.specifier.contains("1.3.99") and gymnasium.specifier.contains("1.4.0")
