@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-from attjax import cli, config_file, run_folder
+from attjax import cli, config_file, destinations, errors, run_folder
 from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
 
 POLICY = "policy"
@@ -75,19 +75,19 @@ def _add_output(group):
     group.add_argument("--playback", type=cli.path, metavar="FILE", help=playback_help)
 
 
-@cli.program("eval.py")
+@errors.program("eval.py")
 def main(argv=None) -> int:
     """Evaluate a checkpoint or a classical controller; returns the exit status."""
     arguments = parse_arguments(argv)
     advice = "fewer --episodes take less"
-    with cli.one_line_errors("eval.py", run_folder.FolderError), cli.enough_memory(advice):
+    with errors.one_line_errors("eval.py", run_folder.FolderError), errors.enough_memory(advice):
         cli.select_device(arguments.device)
         names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
         arguments.frameskip = _frameskip(arguments, names)
         spacecraft = _spacecraft(arguments, names)
         controllers = {name: _controller(name, arguments, spacecraft) for name in names}
-        if arguments.json != STDOUT:
-            _check_writable("--json", arguments.json)
+        if arguments.json not in (None, STDOUT):
+            destinations.check("--json", arguments.json)
         _prepare_playback(arguments.playback, spacecraft.max_steps(arguments.frameskip))
         plots = _prepare_plots(arguments.plot)
         metrics = _metrics(arguments.checkpoint) if plots and POLICY in controllers else []
@@ -143,7 +143,7 @@ def _write_json(file, content):
         print(text, end="", file=file, flush=True)
         return
     with run_folder.writing(file):
-        file.write_text(text)
+        destinations.write(file, text)
 
 
 def _metrics(folder):
@@ -161,13 +161,12 @@ def _prepare_plots(folder):
     try:
         from attjax import plots
     except ImportError:
-        raise cli.UserError("--plot needs matplotlib: pip install 'attjax[plot]'") from None
+        raise errors.UserError("--plot needs matplotlib: pip install 'attjax[plot]'") from None
     except ValueError as error:
-        raise cli.UserError(f"--plot: matplotlib cannot read its matplotlibrc: {error}") from None
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise cli.UserError(f"--plot {folder} cannot be written: {error.strerror}") from None
+        raise errors.UserError(
+            f"--plot: matplotlib cannot read its matplotlibrc: {error}"
+        ) from None
+    destinations.check_folder("--plot", folder)
     return plots
 
 
@@ -178,14 +177,13 @@ def _prepare_playback(path, steps):
     from attjax import playback
 
     if steps > playback.MAX_STEPS:
-        raise cli.UserError(
+        raise errors.UserError(
             f"--playback shows slews of at most {playback.MAX_STEPS:,} agent steps, and these "
             f"have {steps:,}: give a shorter --duration or a larger --frameskip"
         )
     if os.path.exists(path) and not os.path.isfile(path):
-        raise cli.UserError(f"--playback {path} cannot be written: it is no ordinary file")
-    _check_writable("--playback", path)
-    _check_writable("--playback", path.with_name(path.name + ".tmp"))  # as run_folder.replace does
+        raise errors.UserError(f"--playback {path} cannot be written: it is no ordinary file")
+    destinations.check("--playback", path)
 
 
 def _write_playback(arguments, controllers, env, params):
@@ -198,7 +196,7 @@ def _write_playback(arguments, controllers, env, params):
     checkpoint = arguments.checkpoint.resolve().name if name == POLICY else None
     page = playback.page(shown, env, params, arguments.seed or 0, checkpoint)
     with run_folder.writing(arguments.playback):
-        run_folder.replace(arguments.playback, page)
+        destinations.write(arguments.playback, page)
 
 
 def _frameskip(arguments, names):
@@ -222,7 +220,7 @@ def _spacecraft(arguments, names):
         try:
             spacecraft = dataclasses.replace(spacecraft, duration=arguments.duration)
         except ValueError as error:
-            raise cli.UserError(f"--duration {arguments.duration:g}: {error}") from None
+            raise errors.UserError(f"--duration {arguments.duration:g}: {error}") from None
     _check_duration(spacecraft.duration, arguments.frameskip)
     return spacecraft
 
@@ -230,7 +228,7 @@ def _spacecraft(arguments, names):
 def _check_duration(duration, frameskip):
     period = (frameskip + 1) * INTEGRATION_STEP
     if duration is not None and duration < period * (1 - 1e-6):
-        raise cli.UserError(
+        raise errors.UserError(
             f"--duration is {duration} s; it must hold at least one agent step of {period:.4g} s"
         )
 
@@ -246,24 +244,11 @@ def _controller(name, arguments, spacecraft):
     update = checkpoint.best(folder) if arguments.best else None
     trained_on = run_folder.read_config(folder).spacecraft
     if trained_on.num_actions != spacecraft.num_actions:
-        raise cli.UserError(
+        raise errors.UserError(
             f"{arguments.spacecraft} has {spacecraft.num_actions} actions; the policy in {folder} "
             f"chooses among {trained_on.num_actions}"
         )
     return checkpoint.restore_policy(folder, update)
-
-
-def _check_writable(flag, path):
-    """Fail before the work rather than after it; leaves no new file behind."""
-    if path is None:
-        return
-    try:
-        existed = path.exists()
-        path.open("a").close()
-    except OSError as error:
-        raise cli.UserError(f"{flag} {path} cannot be written: {error.strerror}") from None
-    if not existed:
-        path.unlink()
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ import contextlib
 import importlib
 import sys
 
-from attjax import c_names, cli, run_folder
+from attjax import c_names, cli, destinations, errors, run_folder
 
 FORMATS = {"c": "export_c", "onnx": "export_onnx", "stablehlo": "export_stablehlo"}
 NEEDED = {"export_onnx": "onnx", "export_stablehlo": "flatbuffers"}
@@ -54,11 +54,11 @@ def _prefix(text):
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-@cli.program("export.py")
+@errors.program("export.py")
 def main(argv=None) -> int:
     """Export a checkpoint; returns the exit status."""
     arguments = parse_arguments(argv)
-    with cli.one_line_errors("export.py", run_folder.FolderError):
+    with errors.one_line_errors("export.py", run_folder.FolderError):
         cli.select_device(arguments.device)
         module = _module(FORMATS[arguments.format])
         flight = _flight_policy(arguments)
@@ -68,7 +68,7 @@ def main(argv=None) -> int:
             contents = module.files(flight, arguments.seed or 0, arguments.prefix)
         with run_folder.writing(arguments.out):
             for name, content in contents.items():
-                run_folder.replace(arguments.out / name, content)
+                destinations.write(arguments.out / name, content)
         for name in contents:
             print(f"wrote {arguments.out / name}")
     return 0
@@ -81,7 +81,7 @@ def _module(name):
         if error.name != NEEDED.get(name):
             raise
         needed = f"--format needs {error.name}: pip install 'attjax[onnx]'"
-        raise cli.UserError(needed) from None
+        raise errors.UserError(needed) from None
 
 
 def _flight_policy(arguments):
@@ -95,7 +95,7 @@ def _flight_policy(arguments):
     update = checkpoint.best(folder) if arguments.best else newest
     policy, params = checkpoint.restore_network(folder, update)
     if callable(policy.features) and arguments.format != "stablehlo":
-        raise cli.UserError(
+        raise errors.UserError(
             f"the policy in {folder} sees {config.settings.features}, which --format "
             f"{arguments.format} does not know; stablehlo does"
         )
@@ -110,7 +110,7 @@ def _exporting(folder):
     try:
         yield
     except ValueError as error:
-        raise cli.UserError(f"{folder} cannot be exported: {error}") from None
+        raise errors.UserError(f"{folder} cannot be exported: {error}") from None
 
 
 def _prepare(folder, names, overwrite):
@@ -118,17 +118,12 @@ def _prepare(folder, names, overwrite):
 
     Files of other names are left alone; those of an export only give way to ``overwrite``.
     """
-    with run_folder.writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        present = [name for name in names if (folder / name).exists()]
-        if present and not overwrite:
-            raise cli.UserError(
-                f"{folder} holds {present[0]} already: pass --overwrite to replace it, "
-                f"or another --out"
-            )
-        trial = folder / (names[0] + ".tmp")
-        trial.touch()
-        trial.unlink()
+    destinations.check_folder("--out", folder)
+    present = [name for name in names if (folder / name).exists()]
+    if present and not overwrite:
+        raise errors.UserError(
+            f"{folder} holds {present[0]} already: pass --overwrite to replace it, or another --out"
+        )
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import dataclasses
 import importlib
 import sys
 
-from attjax import cli, config_file, presets, run_folder, settings
+from attjax import cli, config_file, errors, presets, run_folder, settings, signals
 from attjax.specification import LM50
 
 DEFAULT_PRESET = "precise"
@@ -60,22 +60,22 @@ def _add_logging(group):
     group.add_argument("--debug-nans", action="store_true", help=debug_help)
 
 
-@cli.program("train.py")
+@errors.program("train.py")
 def main(argv=None) -> int:
     """Run a training; returns the exit status."""
     arguments = parse_arguments(argv)
-    with cli.one_line_errors("train.py", ValueError):
+    with errors.one_line_errors("train.py", ValueError):
         given = _given(arguments)
         new = _new_config(**given)
     if arguments.print_config:
         print(config_file.text(new), end="")
         return 0
-    with cli.StopSignals() as stop, cli.one_line_errors("train.py", run_folder.FolderError):
+    with signals.StopSignals() as stop, errors.one_line_errors("train.py", run_folder.FolderError):
         if arguments.tensorboard:
             _check_tensorboard()
         device = cli.select_device(arguments.device)
         advice = "fewer --num-envs or a shorter --rollout-length take less"
-        with run_folder.opened(arguments.checkpoint), cli.enough_memory(advice):
+        with run_folder.opened(arguments.checkpoint), errors.enough_memory(advice):
             run = _open(arguments, given, new, stop)
             if arguments.tensorboard:
                 run.write_events()
@@ -89,7 +89,7 @@ def _check_tensorboard():
         importlib.import_module("tensorboardX")
     except ImportError:
         needed = "--tensorboard needs tensorboardX: pip install 'attjax[tensorboard]'"
-        raise cli.UserError(needed) from None
+        raise errors.UserError(needed) from None
 
 
 def _given(arguments):
@@ -137,7 +137,7 @@ def _setup(config):
     try:
         return assembly.setup(config.settings, config.spacecraft, num_devices)
     except ValueError as error:
-        raise cli.UserError(error) from None
+        raise errors.UserError(error) from None
 
 
 def _resumed_config(given, config):
@@ -147,9 +147,9 @@ def _resumed_config(given, config):
     differing = [name for name, value in given.items() if run[name] != value]
     if differing:
         listed = ", ".join(f"{name} ({run[name]})" for name in differing)
-        raise cli.UserError(f"--resume keeps the run's settings; leave out {listed}")
+        raise errors.UserError(f"--resume keeps the run's settings; leave out {listed}")
     if total < config.settings.total_steps:
-        raise cli.UserError(
+        raise errors.UserError(
             f"--total-steps is {total}; to resume, it must be at least the run's "
             f"{config.settings.total_steps}"
         )

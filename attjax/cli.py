@@ -6,21 +6,14 @@ import dataclasses
 import functools
 import os
 import shlex
-import signal
 import sys
-import threading
 from pathlib import Path
 
-from attjax import help_text, jax_setup, settings, streams, user_functions
+from attjax import errors, help_text, jax_setup, settings
 
 DEVICES = ("auto", "cpu", "gpu")
-OUTPUT_FAILED, BAD_INPUT = 1, 2
 TABLE_2 = 5
 """Frameskip of the paper's Table 2, 40 Hz."""
-
-
-class UserError(Exception):
-    """Bad input; the message is one line that names what is wrong and what is allowed."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -31,112 +24,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str):
         """Print the message as one line and exit."""
-        _fail(self.prog, message)
-
-
-def program(name: str):
-    """Make a function a command: it prints anywhere, and goes on where printing fails.
-
-    Done all the same, it returns 1 instead of 0, with a line on stderr unless its reader left.
-    """
-
-    def decorate(main):
-        @functools.wraps(main)
-        def command(argv=None) -> int:
-            with streams.guarded():
-                help_text.print_anywhere()
-                try:
-                    status = main(argv)
-                except SystemExit as exit_:  # of --help, or of bad input
-                    if exit_.code or not streams.failure():
-                        raise
-                    status = 0
-                failure = streams.failure()
-                if status or failure is None:
-                    return status
-                if not streams.reader_left(failure):
-                    error_line(name, f"all is done, but stdout failed: {failure.strerror}")
-                return OUTPUT_FAILED
-
-        return command
-
-    return decorate
-
-
-@contextlib.contextmanager
-def one_line_errors(prog: str, *kinds: type[Exception]):
-    """Turn exceptions of these kinds, and what the system says of a file, into one line on stderr
-    and exit status 2.
-    """
-    try:
-        yield
-    except (UserError, user_functions.FunctionError, *kinds) as error:
-        _fail(prog, error)
-    except OSError as error:  # a folder that may not be entered, a name that is too long, ...
-        if error.filename is None:
-            raise
-        _fail(prog, f"{error.filename}: {error.strerror}")
-
-
-def error_line(prog: str, message) -> None:
-    """Print the message as one line on stderr."""
-    print(f"{prog}: error: {' '.join(str(message).split())}", file=sys.stderr)
-
-
-def _fail(prog, message):
-    error_line(prog, message)
-    sys.exit(BAD_INPUT)
-
-
-@contextlib.contextmanager
-def enough_memory(advice: str):
-    """Turn JAX's errors about memory into a :class:`UserError` with this advice."""
-    try:
-        yield
-    except RuntimeError as error:
-        if "RESOURCE_EXHAUSTED" not in str(error):
-            raise
-        raise UserError(f"the memory does not suffice; {advice}") from None
-
-
-class StopSignals:
-    """Notes signals that ask to stop, for the work to end where it can go on; a context manager.
-
-    They are SIGINT and SIGTERM; SIGHUP of a terminal that is gone; and SIGUSR1, SIGUSR2 and
-    SIGXCPU, by which batch systems tell that time runs out. The latter four stay ignored where
-    they were, as after ``nohup``. A second SIGINT or SIGTERM ends the process at once; the others
-    come in pairs by themselves. Beside the main thread, where Python hears no signals, it notes
-    none.
-
-    Attributes:
-        received: the first signal's number, None before.
-    """
-
-    AT_ONCE = ("SIGINT", "SIGTERM")
-    BY_MACHINES = ("SIGHUP", "SIGUSR1", "SIGUSR2", "SIGXCPU")  # of which Windows has none
-    received: int | None = None
-
-    def __enter__(self):
-        self._at_once = _signals(self.AT_ONCE)
-        machines = [s for s in _signals(self.BY_MACHINES) if signal.getsignal(s) != signal.SIG_IGN]
-        in_main = threading.current_thread() is threading.main_thread()
-        heard = [*self._at_once, *machines] if in_main else []
-        self._before = {number: signal.signal(number, self._note) for number in heard}
-        return self
-
-    def __exit__(self, *_):
-        for number, handler in self._before.items():
-            # None: a handler that was not Python's, which it cannot bring back.
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
-
-    def _note(self, number, _):
-        self.received = self.received or number
-        for each in self._at_once:
-            signal.signal(each, signal.SIG_DFL)
-
-
-def _signals(names):
-    return [getattr(signal, name) for name in names if hasattr(signal, name)]
+        errors.fail(self.prog, message)
 
 
 def quoted(path: Path) -> str:
@@ -266,14 +154,14 @@ def select_device(name: str):
     On CPU each core becomes a device of its own, for training to share its work out to.
 
     Raises:
-        UserError: there is no such device, or JAX refuses a variable of the environment.
+        errors.UserError: there is no such device, or JAX refuses a variable of the environment.
     """
     try:
         import jax
     except ValueError as error:
         named = [x for x in os.environ if x.startswith("JAX_") and x.lower() in str(error).lower()]
         values = jax_setup.set_variables(named)
-        raise UserError(f"JAX refuses its settings: {values or error}") from None
+        raise errors.UserError(f"JAX refuses its settings: {values or error}") from None
     if name == "cpu":
         jax.config.update("jax_platforms", "cpu")
         jax.config.update("jax_platform_name", "cpu")
@@ -287,7 +175,7 @@ def select_device(name: str):
         found = jax_setup.set_variables(jax_setup.CHOOSING_DEVICES)
         if not found:
             found = f"it finds {jax.default_backend()}"
-        raise UserError(f"--device is {name}, and JAX finds none; {found}") from None
+        raise errors.UserError(f"--device is {name}, and JAX finds none; {found}") from None
     jax.config.update("jax_default_device", device)
     return device
 

@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 
 from attjax import help_text, presets, settings, specification
-from attjax.cli import UserError
+from attjax.errors import UserError
 from attjax.run_folder import Config
 from attjax.specification import Spacecraft
 

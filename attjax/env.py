@@ -13,7 +13,8 @@ from attjax import rigid_body, spacecraft, spaces
 from attjax.context import Context
 from attjax.reward import Transition, paper_reward
 from attjax.spacecraft import EnvParams, EnvState
-from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft, integer
+from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft
+from attjax.values import integer
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,7 +16,7 @@ from attjax.context import Context
 from attjax.controllers import average_torque
 from attjax.env import AttitudeEnv
 from attjax.spacecraft import EnvParams, EnvState
-from attjax.specification import integer
+from attjax.values import integer
 
 Controller = Callable[[chex.Array, Context], chex.Array]
 """``act(observation (11,), context) -> action``; a pytree, e.g. ``jax.tree_util.Partial``."""

@@ -11,7 +11,7 @@ import numpy as np
 from attjax import checks, programs
 from attjax.gymnasium_task import Task, check_not_forked, outer_time_limit, random_key
 from attjax.gymnasium_vector import SlewVectorEnv
-from attjax.specification import integer
+from attjax.values import integer
 
 __all__ = ["ID", "SlewEnv", "SlewVectorEnv"]
 

@@ -13,7 +13,7 @@ from attjax import quaternion as quaternions
 from attjax.env import AttitudeEnv
 from attjax.evaluation import TABLE_5, Controller
 from attjax.spacecraft import EnvParams, EnvState
-from attjax.specification import integer
+from attjax.values import integer
 
 RANDOM_SLEWS = 4
 MAX_STEPS = 20_000

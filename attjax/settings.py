@@ -8,7 +8,7 @@ import functools
 import math
 
 from attjax import user_functions
-from attjax.specification import plain
+from attjax.values import plain
 
 SEED = {"low": 0, "below": 2**32}
 FRAMESKIP = {"low": 0, "below": 10_500}

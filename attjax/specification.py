@@ -10,6 +10,8 @@ import operator
 import tomllib
 from pathlib import Path
 
+from attjax.values import check_number, check_numbers, plain, shown
+
 INTEGRATION_STEP = 1 / 240
 """Length of one RK4 step, s (paper, section 2.3)."""
 
@@ -27,7 +29,6 @@ Single precision knows a tensor's small moment to 1e-7 of the large one; over so
 coasting body's energy drifts by half a hundredth (measured: at most 0.41/2^24 of it a radian).
 """
 
-LARGEST = 1e30
 MOST_ACTIONS = 1000
 MOST_DURATION = 1e6
 
@@ -78,21 +79,21 @@ class Spacecraft:
         if not isinstance(self.torque_held, bool):
             raise ValueError(f"torque_held is {self.torque_held!r}; it must be true or false")
         least_moment, ratio = self._check_inertia()
-        _check_numbers("torque_levels", self.torque_levels, 1e-12, 1e6)
+        check_numbers("torque_levels", self.torque_levels, 1e-12, 1e6)
         self._check_axes()
-        _check_number("rate_limit", self.rate_limit, 1e-6, 100)
+        check_number("rate_limit", self.rate_limit, 1e-6, 100)
         kick = max(self.torque_levels) * INTEGRATION_STEP / least_moment
         if kick > self.rate_limit:
             raise ValueError(
                 f"torque_levels has {max(self.torque_levels):g}, which changes the rate by up to "
                 f"{kick:.3g} rad/s in 1/240 s; it must be at most rate_limit, {self.rate_limit:g}"
             )
-        _check_number("goal_angle_deg", self.goal_angle_deg, 1e-6, 180)
-        _check_numbers("slew_angles_deg", self.slew_angles_deg, 0, 180, count=2)
+        check_number("goal_angle_deg", self.goal_angle_deg, 1e-6, 180)
+        check_numbers("slew_angles_deg", self.slew_angles_deg, 0, 180, count=2)
         if self.slew_angles_deg[0] > self.slew_angles_deg[1]:
-            shown = _shown(self.slew_angles_deg)
-            raise ValueError(f"slew_angles_deg is {shown}; the first must be the least")
-        _check_number("duration", self.duration, INTEGRATION_STEP, MOST_DURATION)
+            listed = shown(self.slew_angles_deg)
+            raise ValueError(f"slew_angles_deg is {listed}; the first must be the least")
+        check_number("duration", self.duration, INTEGRATION_STEP, MOST_DURATION)
         if ratio * self.rate_limit * self.duration > MOST_TURNS:
             raise ValueError(
                 f"inertia is a tensor whose moments have the ratio {ratio:.4g}; single precision "
@@ -109,36 +110,36 @@ class Spacecraft:
         rows, is_tensor = self.inertia, False
         if isinstance(rows, tuple) and len(rows) == 3 and isinstance(rows[0], tuple):
             for row in rows:
-                _check_numbers("each row of inertia", row, count=3)
+                check_numbers("each row of inertia", row, count=3)
             moments, is_tensor = _principal_moments(rows), True
         else:
-            _check_numbers("inertia", rows, count=3)
+            check_numbers("inertia", rows, count=3)
             moments = sorted(rows)
-        shown = ", ".join(f"{x:g}" for x in moments)
+        listed = ", ".join(f"{x:g}" for x in moments)
         if not LEAST_MOMENT <= moments[0] <= moments[2] <= MOST_MOMENT:
             raise ValueError(
-                f"inertia has principal moments {shown}; "
+                f"inertia has principal moments {listed}; "
                 f"they must be from {LEAST_MOMENT:g} to {MOST_MOMENT:g}"
             )
         if moments[0] < LEAST_RATIO * moments[2]:
             raise ValueError(
-                f"inertia has principal moments {shown}; the least must be at least "
+                f"inertia has principal moments {listed}; the least must be at least "
                 f"{LEAST_RATIO:g} of the largest"
             )
         if moments[2] > (moments[0] + moments[1]) * (1 + ROUNDING):
             raise ValueError(
-                f"inertia has principal moments {shown}; none may exceed the other two together"
+                f"inertia has principal moments {listed}; none may exceed the other two together"
             )
         return moments[0], moments[2] / moments[0] if is_tensor else 1
 
     def _check_axes(self):
         axes = self.torque_axes
         if not isinstance(axes, tuple) or not axes:
-            raise ValueError(f"torque_axes is {_shown(axes)}; it must be a list of [x, y, z]")
+            raise ValueError(f"torque_axes is {shown(axes)}; it must be a list of [x, y, z]")
         for axis in axes:
-            _check_numbers("each of torque_axes", axis, count=3)
+            check_numbers("each of torque_axes", axis, count=3)
             if not any(axis):
-                raise ValueError(f"torque_axes holds {_shown(axis)}; it must be a direction")
+                raise ValueError(f"torque_axes holds {shown(axis)}; it must be a direction")
         if self.num_actions > MOST_ACTIONS:
             raise ValueError(
                 f"torque_levels and torque_axes make {self.num_actions} actions; "
@@ -212,61 +213,13 @@ def from_lists(values: dict, needed: tuple[str, ...] = ()) -> Spacecraft:
     return Spacecraft(**values)
 
 
-def plain(value):
-    """Tuples for lists and arrays, Python's numbers for NumPy's: they can be hashed and written."""
-    value = value.tolist() if hasattr(value, "tolist") else value
-    return tuple(map(plain, value)) if isinstance(value, list | tuple) else value
-
-
-def integer(x) -> int | None:
-    """X as Python's integer, whatever library it is an integer of; None: it is none.
-
-    Example:
-        >>> import numpy as np
-        >>> integer(np.int64(20)), integer(True), integer(20.0)
-        (20, None, None)
-    """
-    try:
-        return None if isinstance(x, bool) else operator.index(x)
-    except TypeError:
-        return None
-
-
-def _check_number(name, x, low, high):
-    if not _is_number(x):
-        raise ValueError(f"{name} is {_shown(x)}; it must be a number")
-    if not low <= x <= high:
-        raise ValueError(f"{name} is {x}; it must be from {low:g} to {high:g}")
-
-
-def _check_numbers(name, values, low=-math.inf, high=math.inf, count=None):
-    is_tuple = isinstance(values, tuple) and values and count in (None, len(values))
-    if not is_tuple or not all(map(_is_number, values)):
-        listed = "a list of numbers" if count is None else f"{count} numbers"
-        raise ValueError(f"{name} is {_shown(values)}; it must be {listed}")
-    if not all(low <= x <= high and abs(x) <= LARGEST for x in values):
-        allowed = "finite" if math.isinf(high) else f"from {low:g} to {high:g}"
-        raise ValueError(f"{name} is {_shown(values)}; they must be {allowed}")
-
-
-def _is_number(x):
-    return isinstance(x, int | float) and not isinstance(x, bool)
-
-
-def _shown(values):
-    """As in the user's file."""
-    if not isinstance(values, tuple):
-        return repr(values)
-    return f"[{', '.join(map(_shown, values))}]"
-
-
 def _principal_moments(rows):
     """The sorted eigenvalues of a symmetric tensor."""
     import numpy as np  # imported late: the usual inertia is three moments
 
     tensor = np.array(rows, float)
     if not np.allclose(tensor, tensor.T, rtol=0, atol=ROUNDING * np.max(np.abs(tensor))):
-        raise ValueError(f"inertia is {_shown(rows)}; it must be symmetric")
+        raise ValueError(f"inertia is {shown(rows)}; it must be symmetric")
     return np.linalg.eigvalsh(tensor).tolist()
 
 

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import jax
 
-from attjax import assembly, checkpoint, cli, learner, metrics, nan_search, ppo, progress
+from attjax import assembly, checkpoint, cli, errors, learner, metrics, nan_search, ppo, progress
 from attjax.run_folder import Config
 from attjax.settings import Settings
+from attjax.signals import StopSignals
 
 DIVERGED = 3
 
@@ -25,7 +26,7 @@ class Run:
         FolderError: the folder's checkpoint or metrics cannot be read.
     """
 
-    def __init__(self, folder: Path, config: Config, setup: learner.Setup, stop: cli.StopSignals):
+    def __init__(self, folder: Path, config: Config, setup: learner.Setup, stop: StopSignals):
         self.folder, self.config, self.settings, self.stop = folder, config, config.settings, stop
         self.setup, self.env_params = setup, assembly.env_params(setup)
         self.learner = learner.init(self.setup, self.env_params, jax.random.key(config.seed))
@@ -94,7 +95,7 @@ class Run:
             with progress.Progress(total, self.agent_steps, rows, self.stop) as view:
                 diverged = self._loop(train_block, saver, view, save_every_s)
             if diverged:
-                cli.error_line("train.py", diverged)
+                errors.error_line("train.py", diverged)
                 return DIVERGED
             saver.save(self.learner, self.terminal_error)
         if self.stop.received is not None:

@@ -18,7 +18,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from attjax import cli
+from attjax import cli, errors
 
 PACKAGES = ("jax", "jaxlib", "numpy", "numba", "bsk")
 MIN_TABLE_WIDTH = 120
@@ -84,10 +84,10 @@ def restrict_to_cores(count: int) -> None:
         UserError: the process may use fewer.
     """
     if not hasattr(os, "sched_setaffinity"):
-        raise cli.UserError(f"{platform.system()} cannot restrict a process to --cores")
+        raise errors.UserError(f"{platform.system()} cannot restrict a process to --cores")
     allowed = sorted(os.sched_getaffinity(0))
     if count > len(allowed):
-        raise cli.UserError(f"--cores is {count}; it must be at most {len(allowed)} here")
+        raise errors.UserError(f"--cores is {count}; it must be at most {len(allowed)} here")
     os.sched_setaffinity(0, allowed[:count])
 
 

@@ -17,7 +17,7 @@ import time
 
 import common
 
-from attjax import cli
+from attjax import cli, errors
 
 NUM_ENVS = (2048, 8192, 32768, 131072, 524288, 1048576)
 NETWORKS = ((400, 300), (64, 64))
@@ -52,7 +52,7 @@ def main(argv=None) -> int:
     if arguments.child is not None:
         print(json.dumps(child(**arguments.child)))
         return 0
-    with cli.one_line_errors("scaling.py"):
+    with errors.one_line_errors("scaling.py"):
         check(arguments)
     machine = common.machine()
     common.print_machine(machine)
@@ -81,10 +81,10 @@ def check(arguments) -> None:
     """Refuse what the machine or the cores do not allow."""
     allowed = len(os.sched_getaffinity(0))
     if arguments.cores > allowed:
-        raise cli.UserError(f"--cores is {arguments.cores}; it must be at most {allowed} here")
+        raise errors.UserError(f"--cores is {arguments.cores}; it must be at most {allowed} here")
     uneven = [n for n in arguments.num_envs if n % arguments.cores]
     if uneven:
-        raise cli.UserError(
+        raise errors.UserError(
             f"--num-envs has {uneven[0]}, not a multiple of --cores, {arguments.cores}"
         )
 

@@ -14,7 +14,7 @@ import sys
 import common
 import numpy as np
 
-from attjax import cli
+from attjax import cli, errors
 
 NUM_ENVS = (1, 4, 16, 64, 256, 1024, 2048, 4096, 16384, 65536, 262144, 1048576)
 RK4_STEPS = 21
@@ -49,14 +49,14 @@ def parse_arguments(argv):
 def main(argv=None) -> int:
     """Run the benchmark; returns the exit status."""
     arguments = parse_arguments(argv)
-    with cli.one_line_errors("simulator.py"):
+    with errors.one_line_errors("simulator.py"):
         check_sizes(arguments)
         device = select_device(arguments.device, arguments.cores)
     machine = common.machine(device.device_kind if arguments.device == "gpu" else None)
     common.print_machine(machine)
     # Imported late: it imports JAX's arrays, and cores and device must be set before.
     peers = importlib.import_module("peers")
-    with cli.one_line_errors("simulator.py", ArithmeticError):
+    with errors.one_line_errors("simulator.py", ArithmeticError):
         contenders, absent = peers.find(arguments.device, arguments.cores)
     rows, ceilings = measure(peers, contenders, arguments.num_envs, arguments.repeats)
     result = {"machine": machine, "cores": arguments.cores, "ceilings": ceilings}
@@ -73,7 +73,7 @@ def check_sizes(arguments) -> None:
     cores = arguments.cores
     uneven = [n for n in arguments.num_envs if n > cores and n % cores]
     if uneven:
-        raise cli.UserError(f"--num-envs has {uneven[0]}, not a multiple of --cores, {cores}")
+        raise errors.UserError(f"--num-envs has {uneven[0]}, not a multiple of --cores, {cores}")
 
 
 def select_device(name: str, cores: int):
@@ -86,7 +86,7 @@ def select_device(name: str, cores: int):
     try:
         device = jax.devices(name)[0]
     except RuntimeError:
-        raise cli.UserError(f"--device is {name}, and JAX finds none") from None
+        raise errors.UserError(f"--device is {name}, and JAX finds none") from None
     jax.config.update("jax_default_device", device)
     return device
 

@@ -196,7 +196,7 @@ def _export(arguments):
     module = export_script.FORMATS[export_script.parse_arguments(arguments).format]
     try:
         export_script._module(module)
-    except export_script.cli.UserError:  # the extra is not installed
+    except export_script.errors.UserError:  # the extra is not installed
         return
     _succeeds(export_script.main, [*arguments, "--device", "cpu"])
 

@@ -243,8 +243,8 @@ sys.exit(train.main(sys.argv[1:]))
 def test_a_second_signal_ends_the_process_at_once(tmp_path):
     code = """
 import os, signal
-from attjax import cli
-with cli.StopSignals() as stop:
+from attjax import signals
+with signals.StopSignals() as stop:
     os.kill(os.getpid(), signal.SIGTERM)
     assert stop.received == signal.SIGTERM
     os.kill(os.getpid(), signal.SIGINT)

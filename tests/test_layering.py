@@ -8,6 +8,7 @@ from pathlib import Path
 import attjax
 
 LAYERS = [
+    {"values"},
     {
         "user_functions",
         "specification",
@@ -18,6 +19,7 @@ LAYERS = [
         "numerics",
         "sb3",
         "canvas",
+        "signals",
     },
     {"vector", "belongings", "streams"},
     {"settings", "programs", "context", "c_names", "c_text"},
@@ -34,7 +36,8 @@ LAYERS = [
     {"ppo"},
     {"presets", "assembly", "run_folder", "nan_search"},
     {"help_text", "panel", "provenance", "jax_setup"},
-    {"progress", "metrics", "report", "cli", "flight_policy"},
+    {"progress", "metrics", "report", "errors", "flight_policy"},
+    {"cli", "destinations"},
     {"checkpoint", "config_file", "tensorboard", "flight_check"},
     {"training", "plots", "playback", "export_c", "export_onnx", "export_stablehlo"},
 ]

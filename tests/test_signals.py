@@ -13,8 +13,8 @@ from attjax import checkpoint
 HEARD = ["SIGINT", "SIGTERM", "SIGHUP", "SIGUSR1", "SIGUSR2", "SIGXCPU"]
 STOP = """
 import os, signal, sys
-from attjax import cli
-with cli.StopSignals() as stop:
+from attjax import signals
+with signals.StopSignals() as stop:
     for name in sys.argv[1:]:
         os.kill(os.getpid(), getattr(signal, name))
     print(stop.received)

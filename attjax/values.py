@@ -1,0 +1,67 @@
+"""Plain values that users hand in, from files or from Python: what they are, and checks of them.
+
+This module imports nothing heavy, so that errors are instant.
+"""
+
+import math
+import operator
+
+LARGEST = 1e30
+
+
+def plain(value):
+    """Tuples for lists and arrays, Python's numbers for NumPy's: they can be hashed and written."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return tuple(map(plain, value)) if isinstance(value, list | tuple) else value
+
+
+def integer(x) -> int | None:
+    """X as Python's integer, whatever library it is an integer of; None: it is none.
+
+    Example:
+        >>> import numpy as np
+        >>> integer(np.int64(20)), integer(True), integer(20.0)
+        (20, None, None)
+    """
+    try:
+        return None if isinstance(x, bool) else operator.index(x)
+    except TypeError:
+        return None
+
+
+def check_number(name: str, x, low: float, high: float) -> None:
+    """Check a number.
+
+    Raises:
+        ValueError: it is none, or is not from low to high.
+    """
+    if not _is_number(x):
+        raise ValueError(f"{name} is {shown(x)}; it must be a number")
+    if not low <= x <= high:
+        raise ValueError(f"{name} is {x}; it must be from {low:g} to {high:g}")
+
+
+def check_numbers(name: str, values, low=-math.inf, high=math.inf, count=None) -> None:
+    """Check a tuple of numbers, of ``count`` if that is given.
+
+    Raises:
+        ValueError: it is none, or one of them is not from low to high.
+    """
+    is_tuple = isinstance(values, tuple) and values and count in (None, len(values))
+    if not is_tuple or not all(map(_is_number, values)):
+        listed = "a list of numbers" if count is None else f"{count} numbers"
+        raise ValueError(f"{name} is {shown(values)}; it must be {listed}")
+    if not all(low <= x <= high and abs(x) <= LARGEST for x in values):
+        allowed = "finite" if math.isinf(high) else f"from {low:g} to {high:g}"
+        raise ValueError(f"{name} is {shown(values)}; they must be {allowed}")
+
+
+def _is_number(x):
+    return isinstance(x, int | float) and not isinstance(x, bool)
+
+
+def shown(values) -> str:
+    """As in a user's file."""
+    if not isinstance(values, tuple):
+        return repr(values)
+    return f"[{', '.join(map(shown, values))}]"
