@@ -201,6 +201,8 @@ def _write_playback(arguments, controllers, env, params):
 
 def _frameskip(arguments, names):
     """The control rate, by default one that the policy was trained at."""
+    if arguments.frameskip is not None:
+        _check_duration(arguments.duration, arguments.frameskip)
     trained = None
     if POLICY in names:
         trained = run_folder.read_config(arguments.checkpoint).settings.frameskips
@@ -209,7 +211,6 @@ def _frameskip(arguments, names):
 
 def _spacecraft(arguments, names):
     """What flies, with the duration that was asked for."""
-    _check_duration(arguments.duration, arguments.frameskip)
     if arguments.spacecraft is not None:
         spacecraft = config_file.read_spacecraft(arguments.spacecraft)
     elif POLICY in names:

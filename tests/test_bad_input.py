@@ -57,7 +57,10 @@ def test_bad_training_arguments(arguments, named, capsys):
         (["--frameskip", "1.5"], "frameskip is '1.5'"),
         (["--duration", "0"], "duration is 0.0"),
         (["--duration", "inf"], "duration is inf"),
-        (["--duration", "0.01", "--device", "cpu"], "at least one agent step of 0.025 s"),
+        (
+            ["--duration", "0.01", "--frameskip", "5", "--device", "cpu"],
+            "at least one agent step of 0.025 s",
+        ),
         (["--checkpoint", "/nowhere", "--device", "cpu"], "no checkpoint folder /nowhere"),
         (["--checkpoint", str(ROOT / "tests"), "--device", "cpu"], "no attjax checkpoint"),
     ],

@@ -6,6 +6,7 @@ import pytest
 from commands import ROOT, one_line_error, run, train_script
 
 from attjax import config_file, presets, run_folder
+from attjax.errors import UserError
 from attjax.specification import LM50
 
 
@@ -70,5 +71,5 @@ def test_files_that_cannot_be_read(tmp_path, capsys):
     for path in (tmp_path, tmp_path / "missing.toml"):
         error = one_line_error(train_script.main, ["--config", str(path)], capsys)
         assert f"--config {path} cannot be read" in error
-    with pytest.raises(errors.UserError):
+    with pytest.raises(UserError):
         config_file.read(ROOT / "nowhere")

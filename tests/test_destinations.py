@@ -50,7 +50,7 @@ def test_checks_leave_nothing_behind(tmp_path):
     destinations.check("--json", tmp_path / "a")
     destinations.check_folder("--out", tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["a.tmp"]
-    with pytest.raises(UserError, match="--json .*nowhere/a cannot be written: No such file"):
+    with pytest.raises(UserError, match=r"--json .*nowhere/a cannot be written: No such file"):
         destinations.check("--json", tmp_path / "nowhere" / "a")
 
 
