@@ -85,7 +85,7 @@ def test_it_fits_and_ends_with_examples_that_are_accepted(script, columns, capsy
     examples = re.findall(rf"^  python {re.escape(script)}((?: \S+)*)", text, re.M)
     assert len(examples) >= 2
     for example in examples:
-        SCRIPTS[script].parse_arguments(example.split(" > ")[0].split())
+        SCRIPTS[script].parse_arguments(re.split(" [>|] ", example)[0].split())
 
 
 @pytest.mark.parametrize("script", SCRIPTS)
