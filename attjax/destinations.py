@@ -15,10 +15,10 @@ def check(flag: str, path: Path) -> None:
         UserError: it cannot.
     """
     with _one_line(flag, path):
-        if path.exists():
-            path.open("ab").close()
-        else:
-            _try(path.parent)
+        existed = path.exists()
+        path.open("ab").close()
+        if not existed:
+            path.unlink()
 
 
 def check_folder(flag: str, folder: Path) -> None:
@@ -29,7 +29,9 @@ def check_folder(flag: str, folder: Path) -> None:
     """
     with _one_line(flag, folder):
         folder.mkdir(parents=True, exist_ok=True)
-        _try(folder)
+        trial = _unused(folder)
+        trial.open("xb").close()
+        trial.unlink()
 
 
 @contextlib.contextmanager
@@ -64,12 +66,6 @@ def write(path: Path, content: str | bytes) -> None:
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
-
-
-def _try(folder):
-    trial = _unused(folder)
-    trial.open("xb").close()
-    trial.unlink()
 
 
 def _unused(folder):
