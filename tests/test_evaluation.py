@@ -229,7 +229,7 @@ def test_one_episode_is_flown_and_none_is_refused():
         jax.tree_util.Partial(coast), ENV, with_steps(ENV, 1), jax.random.key(0), 1
     )
     assert one.score.shape == (1,)
-    with pytest.raises(ValueError, match="episodes is 0; it must be at least 1"):
+    with pytest.raises(ValueError, match="episodes is 0; it must be an integer at least 1"):
         evaluation.fly(jax.tree_util.Partial(coast), ENV, with_steps(ENV, 1), jax.random.key(0), 0)
 
 
