@@ -83,7 +83,8 @@ def main(argv=None) -> int:
     with errors.one_line_errors("eval.py", run_folder.FolderError), errors.enough_memory(advice):
         cli.select_device(arguments.device)
         names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
-        arguments.frameskip = _frameskip(arguments, names)
+        trained = _trained(arguments, names)
+        arguments.frameskip = cli.frameskip(arguments.frameskip, trained)
         spacecraft = _spacecraft(arguments, names)
         controllers = {name: _controller(name, arguments, spacecraft) for name in names}
         if arguments.json not in (None, STDOUT):
@@ -94,6 +95,7 @@ def main(argv=None) -> int:
         json_file, aside = arguments.json, contextlib.nullcontext()
         if json_file == STDOUT:
             json_file, aside = sys.stdout, contextlib.redirect_stdout(sys.stderr)
+        cli.warn_of_untrained("eval.py", arguments.frameskip, trained)
         with aside:
             return _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file)
 
@@ -199,14 +201,13 @@ def _write_playback(arguments, controllers, env, params):
         destinations.write(arguments.playback, page)
 
 
-def _frameskip(arguments, names):
-    """The control rate, by default one that the policy was trained at."""
+def _trained(arguments, names):
+    """The frameskips that the policy was trained at; None where there is no policy."""
     if arguments.frameskip is not None:
         _check_duration(arguments.duration, arguments.frameskip)
-    trained = None
     if POLICY in names:
-        trained = run_folder.read_config(arguments.checkpoint).settings.frameskips
-    return cli.frameskip("eval.py", arguments.frameskip, trained)
+        return run_folder.read_config(arguments.checkpoint).settings.frameskips
+    return None
 
 
 def _spacecraft(arguments, names):

@@ -64,6 +64,8 @@ def main(argv=None) -> int:
         flight = _flight_policy(arguments)
         names = [c_names.renamed(name, arguments.prefix) for name in module.FILES]
         _prepare(arguments.out, names, arguments.overwrite)
+        trained = run_folder.read_config(arguments.checkpoint).settings.frameskips
+        cli.warn_of_untrained("export.py", flight.env.frameskip, trained)
         with _exporting(arguments.checkpoint):
             contents = module.files(flight, arguments.seed or 0, arguments.prefix)
         with run_folder.writing(arguments.out):
@@ -99,7 +101,7 @@ def _flight_policy(arguments):
             f"the policy in {folder} sees {config.settings.features}, which --format "
             f"{arguments.format} does not know; stablehlo does"
         )
-    frameskip = cli.frameskip("export.py", arguments.frameskip, config.settings.frameskips)
+    frameskip = cli.frameskip(arguments.frameskip, config.settings.frameskips)
     with _exporting(folder):
         env = AttitudeEnv(frameskip, spacecraft=config.spacecraft)
         return FlightPolicy(policy, params, env, provenance.of_run(config, update, newest))

@@ -70,27 +70,30 @@ def add_frameskip(group, meaning: str) -> None:
     add_number(group, "frameskip", int, None, help, **settings.FRAMESKIP)
 
 
-def frameskip(prog: str, given: int | None, trained: tuple[int, ...] | None) -> int:
+def frameskip(given: int | None, trained: tuple[int, ...] | None) -> int:
     """The frameskip that was asked for, or else one that suits the controller.
 
     Args:
-        prog: the program, which warns of one that was not trained.
         given: what the user asked for, if anything.
         trained: those that the policy was trained at; None of a controller without training.
 
     Example:
-        >>> frameskip("eval.py", None, (7, 3, 20))  # the quicker of two as near
+        >>> frameskip(None, (7, 3, 20))  # the quicker of two as near
         3
     """
-    if given is None:
-        return min(trained or [TABLE_2], key=lambda k: (abs(k - TABLE_2), k))
-    if trained and given not in trained:
+    if given is not None:
+        return given
+    return min(trained or [TABLE_2], key=lambda k: (abs(k - TABLE_2), k))
+
+
+def warn_of_untrained(prog: str, frameskip: int, trained: tuple[int, ...] | None) -> None:
+    """Print a line on stderr for a frameskip that the policy was not trained at."""
+    if trained and frameskip not in trained:
         rates = ", ".join(map(str, sorted(set(trained))))
         print(
-            f"{prog}: warning: frameskip {given} was not trained; the run trained {rates}",
+            f"{prog}: warning: frameskip {frameskip} was not trained; the run trained {rates}",
             file=sys.stderr,
         )
-    return given
 
 
 def add_number(group, name: str, kind: type, default, help: str, **details) -> None:

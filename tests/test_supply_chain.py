@@ -17,8 +17,14 @@ MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
 MODULES |= {"socket", "urllib", "http", "requests", "ftplib"}
 CORE = {"jax", "jaxlib", "flax", "optax", "chex", "numpy", "orbax-checkpoint", "rich"}
 IMPORTED = {name.removesuffix("-checkpoint") for name in CORE}
-FOR_EXTRAS = {"plots", "rendering", "sb3", "gymnax_compat", "export_onnx", "export_stablehlo"}
-FOR_EXTRAS |= {"tensorboard", "gymnasium_task", "gymnasium_vector", "gymnasium_env"}
+FOR_EXTRAS = {"canvas", "plots", "rendering", "sb3", "gymnax_compat", "export_onnx"}
+FOR_EXTRAS |= {
+    "export_stablehlo",
+    "tensorboard",
+    "gymnasium_task",
+    "gymnasium_vector",
+    "gymnasium_env",
+}
 CALLS = {"eval", "exec", "compile", "__import__"}
 
 
