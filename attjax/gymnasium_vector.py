@@ -1,7 +1,5 @@
 """The slew task for Gymnasium: many spacecraft in one jitted call."""
 
-import operator
-
 import jax
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -9,6 +7,7 @@ from gymnasium.vector.utils import batch_space
 
 from attjax import checks, programs
 from attjax.gymnasium_task import Task, check_not_forked, random_key, starting_key
+from attjax.values import integer
 
 EACH_ITS_OWN = ("action_masks", "render")
 """Methods whose result has a part for each spacecraft."""
@@ -162,12 +161,12 @@ class SlewVectorEnv(Task, VectorEnv):
 
     def _starting_keys(self, seed):
         """A key for each spacecraft; also sets the key of all later episodes."""
-        if seed is None or isinstance(seed, int | np.integer):
-            super().reset(seed=None if seed is None else int(seed))
+        if _is_seed(seed):
+            super().reset(seed=integer(seed))
             self._key, key = jax.random.split(random_key(self.np_random))
             return jax.random.split(key, self.num_envs)
         seeds = list(seed) if np.ndim(seed) == 1 else []
-        if len(seeds) != self.num_envs or not all(isinstance(x, _SEEDS) for x in seeds):
+        if len(seeds) != self.num_envs or not all(map(_is_seed, seeds)):
             raise ValueError(
                 f"seed is {seed!r}; it must be an integer, or a list of {self.num_envs} of them"
             )
@@ -179,17 +178,14 @@ class SlewVectorEnv(Task, VectorEnv):
         return jax.numpy.stack(keys)
 
 
-_SEEDS = int | np.integer | None
+def _is_seed(x):
+    return x is None or integer(x) is not None
 
 
 def _positive(name, x):
-    try:
-        value = operator.index(x)
-    except TypeError:
-        value = 0
-    if value < 1:
+    if (integer(x) or 0) < 1:
         raise ValueError(f"{name} is {x!r}; it must be a positive integer")
-    return value
+    return integer(x)
 
 
 def _mode(mode):
