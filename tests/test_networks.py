@@ -26,6 +26,7 @@ def test_sizes_are_table_3():
     for name, outputs in (("policy", 19), ("value", 1)):
         kernels = [layer["kernel"].shape for layer in params[name]["params"].values()]
         assert kernels == [(11, 400), (400, 300), (300, outputs)]
+    assert hash(Policy()) == hash(Policy())  # a static argument
 
 
 def test_layers_begin_orthogonal_and_without_bias(x64):
@@ -125,6 +126,17 @@ def test_mask_removes_exactly_the_actions_that_lead_beyond_the_limit(x64, durati
         np.testing.assert_array_equal(ours, expected)
         limited += not expected.all()
     assert limited > 50
+
+
+def test_mask_at_its_very_edges(x64):
+    """A sphere at rest, whose rate a torque held for 0.5 s brings to just what the mask keeps."""
+    torques = jnp.array([[0.0, 0, 0], [1.0, 0, 0], [1.0 + 1e-12, 0, 0], [1e-200, 0, 0]])
+    context = CONTEXT.replace(
+        inertia=jnp.ones(3), torque_table=torques, torque_duration=0.5, rate_limit=jnp.array(1.0)
+    )
+    assert networks.rate_mask(observe([0, 0, 0]), context, 0.5).tolist() == [1, 1, 0, 1]
+    # Beyond the limit, a torque that is lost in rounding lowers nothing.
+    assert networks.rate_mask(observe([0, 2, 0]), context, 0.5).tolist() == [1, 0, 0, 0]
 
 
 @pytest.mark.parametrize("frameskip", [0, 5, 20])
