@@ -53,7 +53,7 @@ def test_the_papers_policy_sees_the_observation_and_masks_nothing():
 def test_values_and_masked_probabilities_written_out(x64):
     """With one hidden layer, in NumPy; a masked action has no part of the sum."""
     policy = Policy(hidden_sizes=(6,), num_actions=4)
-    params = parameters(policy)
+    params = jax.tree.map(lambda x: x + 0.1, parameters(policy))  # biases too
     x = np.random.default_rng(3).normal(size=(5, 11))
     allowed = np.array([[1, 0, 1, 1], [1, 1, 1, 1], [0, 0, 1, 0], [1, 1, 0, 0], [0, 1, 0, 1]], bool)
 
