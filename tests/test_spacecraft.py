@@ -149,6 +149,7 @@ def test_near_goal_starts_are_made_of_independent_uniform_numbers():
         for x in numbers:
             counts, _ = np.histogram(x, np.linspace(0, 1, 11))
             np.testing.assert_allclose(counts, count / 10, atol=5 * np.sqrt(0.09 * count))
+            np.testing.assert_allclose([min(x), max(x)], [0, 1], atol=1e-3)
         related = np.corrcoef(numbers) - np.eye(len(numbers))
         assert np.abs(related).max() < 5 / np.sqrt(count)
 
