@@ -242,3 +242,5 @@ def test_explained_variance_of_a_constant_target():
     )
     _, metrics = descent.loss(setup, params, constant, 0.0)
     assert float(metrics["explained_variance"]) == pytest.approx(1, abs=1e-2)
+    _, metrics = descent.loss(setup, params, samples.replace(target=jnp.ones(4)), 0.0)
+    assert -np.inf < float(metrics["explained_variance"]) < -1e6  # a value that is not
