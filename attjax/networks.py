@@ -48,7 +48,7 @@ class Dense(nn.Module):
     scale: float
 
     @nn.compact
-    def __call__(self, x, axis=0):
+    def __call__(self, x, axis):
         """Kernelᵀ x + bias, (outputs, samples), summed over the ``axis`` of x that holds inputs."""
         dtype = jnp.zeros(()).dtype
         initial = nn.initializers.orthogonal(self.scale)

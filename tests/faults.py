@@ -110,8 +110,8 @@ FAULTS = {
         ["test_evaluation.py"],
     ),
     "factor of the time-optimal reference": (
-        "evaluation.py", "return 2 * jnp.sqrt(jnp.sum(momentum)",
-        "return 3 * jnp.sqrt(jnp.sum(momentum)", ["test_evaluation.py"],
+        "evaluation.py", "return 2 * numerics.square_root(jnp.sum(momentum)",
+        "return 3 * numerics.square_root(jnp.sum(momentum)", ["test_evaluation.py"],
     ),
     "reward_scale ignored": (
         "rollout.py", "reward * setup.settings.reward_scale", "reward", ["test_rollout.py"],
@@ -140,6 +140,10 @@ FAULTS = {
     "multi-scale features without the period": (
         "networks.py", "10 * control_period, jnp.log(10 * control_period)",
         "0 * control_period, 0 * control_period", ["test_networks.py"],
+    ),
+    "rate mask without its second-order remainder": (
+        "rigid_body.py", "MOST_TURNING = 0.5**0.5", "MOST_TURNING = 0.0",
+        ["test_rate_limit.py"],
     ),
     "observation bound without coasting": (
         "env.py", "(params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))",

@@ -159,10 +159,11 @@ def test_every_pass_takes_all_samples_in_an_order_of_its_own(monkeypatch, num_de
     assert len({frozenset(x % per_device) for _, x, _ in taken}) == len(taken)
 
 
-def test_samples_beyond_whole_minibatches_sit_a_pass_out(monkeypatch):
-    setup = small_setup(num_envs=8, rollout_length=16, minibatch_size=48, passes=4)
+@pytest.mark.parametrize("num_devices", [1, 2])
+def test_samples_beyond_whole_minibatches_sit_a_pass_out(monkeypatch, num_devices):
+    setup = small_setup(num_devices, num_envs=8, rollout_length=16, minibatch_size=48, passes=4)
     taken, _ = minibatches(monkeypatch, setup, 128)
-    assert [len(x) for _, x, _ in taken] == [48] * 8
+    assert [len(x) for _, x, _ in taken] == [48 // num_devices] * 8 * num_devices
     times = np.bincount(np.concatenate([x for _, x, _ in taken]), minlength=128)
     assert times.sum() == 4 * 96 and times.max() <= 4 and len(set(times)) > 1
 
@@ -242,3 +243,5 @@ def test_explained_variance_of_a_constant_target():
     )
     _, metrics = descent.loss(setup, params, constant, 0.0)
     assert float(metrics["explained_variance"]) == pytest.approx(1, abs=1e-2)
+    _, metrics = descent.loss(setup, params, samples.replace(target=jnp.ones(4)), 0.0)
+    assert -np.inf < float(metrics["explained_variance"]) < -1e6  # a value that is not

@@ -76,7 +76,10 @@ def test_summary_agrees_with_numpy():
     x = np.random.default_rng(0).normal(size=1001)
     summary = evaluation.summarize(x)
     assert list(summary) == ["mean", "std", "min", "q1", "q2", "q3", "max"]
-    assert summary["q1"] == np.percentile(x, 25) and summary["std"] == x.std()
+    expected = [x.mean(), x.std(), x.min(), *np.percentile(x, [25, 50, 75]), x.max()]
+    assert list(summary.values()) == expected
+    assert evaluation.summarize(np.array([2.0])) == dict(zip(summary, [2, 0, 2, 2, 2, 2, 2]))
+    assert evaluation.summarize(np.array([])) == dict.fromkeys(summary)
 
 
 def test_sums_over_a_long_episode_do_not_drift():
@@ -114,6 +117,18 @@ def test_the_closest_sample_is_kept_with_its_rate():
     assert history["terminal"]["rate_rad_s"]["min"] == pytest.approx(kicked, rel=1e-4)
 
 
+def test_of_equal_angles_the_first_counts_and_the_goal_angle_is_inside(monkeypatch):
+    """Three pushes while the angle is kept at 0.25 rad."""
+    monkeypatch.setattr(quaternions, "error_angle", lambda q: 0.25 + 0 * q[3])
+    env = AttitudeEnv(0)
+    params = with_steps(env, 3).replace(goal_angle=jnp.array(0.25))
+    flown = evaluation.fly(jax.tree_util.Partial(spin_up), env, params, jax.random.key(0), 1)
+    kick = 0.5 / 240 / 0.115
+    np.testing.assert_allclose(flown.closest_rate, kick, rtol=1e-5)
+    np.testing.assert_allclose(flown.terminal_rate, 3 * kick, rtol=1e-5)
+    assert flown.last_outside.tolist() == [0]
+
+
 def turning_towards_the_goal(key, params):
     half = -0.0275 / 2
     quaternion = jnp.array([np.sin(half), 0, 0, np.cos(half)], float)
@@ -136,6 +151,7 @@ def test_a_torque_counts_for_as_long_as_it_acts(held, duration):
     flown = evaluation.fly(act, env, params, jax.random.key(0), 3)
     np.testing.assert_allclose(flown.impulse, 12 * 0.003 * duration, rtol=1e-5)
     np.testing.assert_allclose(flown.terminal_rate, 12 * step, rtol=1e-5)
+    assert flown.last_outside.tolist() == [40] * 3  # never near the goal
 
 
 def test_table_5_is_the_papers():

@@ -2,6 +2,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from bodies import LM50, rotated_inertia
 
 from attjax import AttitudeEnv, dynamics, networks, observation, rigid_body, spacecraft
 from attjax.networks import Inputs, Policy
@@ -26,6 +27,7 @@ def test_sizes_are_table_3():
     for name, outputs in (("policy", 19), ("value", 1)):
         kernels = [layer["kernel"].shape for layer in params[name]["params"].values()]
         assert kernels == [(11, 400), (400, 300), (300, outputs)]
+    assert hash(Policy()) == hash(Policy())  # a static argument
 
 
 def test_layers_begin_orthogonal_and_without_bias(x64):
@@ -44,14 +46,14 @@ def test_the_papers_policy_sees_the_observation_and_masks_nothing():
     observed = observe([0.6, 0.5, -0.4], (0.1, -0.7, 0.5, 0.5))
     inputs = Policy().encode(observed, CONTEXT)
     np.testing.assert_array_equal(inputs.features, observed)
-    assert inputs.allowed.shape == (19,) and inputs.allowed.all()
+    assert inputs.allowed.shape == (19,) and inputs.allowed.all() and Policy().rate_margin == 0
     assert not Policy(rate_margin=1e-3).encode(observed, CONTEXT).allowed.all()
 
 
 def test_values_and_masked_probabilities_written_out(x64):
     """With one hidden layer, in NumPy; a masked action has no part of the sum."""
     policy = Policy(hidden_sizes=(6,), num_actions=4)
-    params = parameters(policy)
+    params = jax.tree.map(lambda x: x + 0.1, parameters(policy))  # biases too
     x = np.random.default_rng(3).normal(size=(5, 11))
     allowed = np.array([[1, 0, 1, 1], [1, 1, 1, 1], [0, 0, 1, 0], [1, 1, 0, 0], [0, 1, 0, 1]], bool)
 
@@ -125,6 +127,41 @@ def test_mask_removes_exactly_the_actions_that_lead_beyond_the_limit(x64, durati
         np.testing.assert_array_equal(ours, expected)
         limited += not expected.all()
     assert limited > 50
+
+
+@pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
+@pytest.mark.parametrize("duration", [0.003, 0.5], ids=["below", "beyond the middle"])
+def test_mask_constants_written_out(x64, inertia, duration):
+    """For a spacecraft at rest a weak torque and one that passes the limit at once."""
+    torques = np.array([[0.0, 0, 0], [0.5, 0.2, -0.9], [0, -0.3, 0]])
+    context = CONTEXT.replace(
+        inertia=jnp.asarray(inertia),
+        torque_table=jnp.asarray(torques),
+        torque_duration=duration,
+        rate_limit=jnp.array(0.5),
+    )
+    tensor = np.diag(inertia) if inertia.ndim == 1 else inertia
+    low, _, high = np.sort(LM50)
+    form = ((low + high) * tensor - tensor @ tensor) / (low * high)
+    change = torques @ np.linalg.inv(tensor) * duration
+    growth = np.sqrt(np.einsum("ai,ij,aj->a", change, form, change))
+    turning = np.sqrt(1 / 2) * duration * growth
+    turning = turning * (0.4**2 + 2 / 3 * 0.4 * growth + growth**2 / 6)
+    allowed = np.minimum(0.3**2 + turning, 0.4**2)  # with a margin of 0.6: 0.3, in the middle 0.4
+    ours = networks.rate_mask_constants(context, 0.6)
+    for x, expected in zip(ours, (form, change, growth**2 + turning, allowed), strict=True):
+        np.testing.assert_allclose(x, expected, rtol=1e-12, atol=1e-15)
+
+
+def test_mask_at_its_very_edges(x64):
+    """A sphere at rest, whose rate a torque held for 0.5 s brings to just what the mask keeps."""
+    torques = jnp.array([[0.0, 0, 0], [1.0, 0, 0], [1.0 + 1e-12, 0, 0], [1e-200, 0, 0]])
+    context = CONTEXT.replace(
+        inertia=jnp.ones(3), torque_table=torques, torque_duration=0.5, rate_limit=jnp.array(1.0)
+    )
+    assert networks.rate_mask(observe([0, 0, 0]), context, 0.5).tolist() == [1, 1, 0, 1]
+    # Beyond the limit, a torque that is lost in rounding lowers nothing.
+    assert networks.rate_mask(observe([0, 2, 0]), context, 0.5).tolist() == [1, 0, 0, 0]
 
 
 @pytest.mark.parametrize("frameskip", [0, 5, 20])

@@ -54,3 +54,13 @@ def test_inverse_momentum_and_moments_agree_with_numpy(x64):
     moments = rigid_body.principal_moments(jnp.asarray(inertia))
     np.testing.assert_allclose(moments, np.sort(LM50))
     np.testing.assert_array_equal(rigid_body.principal_moments(jnp.asarray(LM50)), LM50)
+
+
+def test_most_turning_is_that_of_a_flat_body(x64):
+    """Its rate halfway between the axes of the least and of the largest moment."""
+    inertia = np.array([1e-3, 0.999, 1.0])
+    rate = np.array([1, 0, 1]) / np.sqrt(2)
+    form = np.asarray(rigid_body.peak_rate_form(jnp.asarray(inertia)))
+    assert rate @ form @ rate == pytest.approx(1)
+    turning = np.cross(rate, inertia * rate) / inertia
+    assert np.sqrt(turning @ form @ turning) == pytest.approx(rigid_body.MOST_TURNING, rel=1e-3)

@@ -120,3 +120,96 @@ def test_float64_throughout_when_enabled(x64):
     assert start.quaternion.dtype == after.quaternion.dtype == jnp.float64
     assert after.angular_velocity.dtype == jnp.float64
     assert after.time.dtype == jnp.int32
+
+
+def uniforms(direction):
+    """The two uniform numbers that a direction (n, 3) was made of: z and the azimuth."""
+    x, y, z = np.asarray(direction, np.float64).T
+    return [(z + 1) / 2, np.arctan2(y, x) / (2 * np.pi) % 1]
+
+
+def test_near_goal_starts_are_made_of_independent_uniform_numbers():
+    """Each quantity is uniform after its inverse distribution function, and no two are related."""
+    n = 100_000
+    params = spacecraft.default_params()
+    starts = spacecraft.NearGoalStarts(share=0.5, steps=64)
+    drawn = jax.vmap(starts, (0, None))(jax.random.split(jax.random.key(0), n), params)
+    near = np.asarray(drawn.time) > 0
+    angle = np.asarray(jax.vmap(quaternions.error_angle)(drawn.quaternion))
+    axis = np.asarray(drawn.quaternion)[:, :3] / np.sin(angle / 2)[:, None]
+    rate = np.linalg.norm(drawn.angular_velocity, axis=1)
+    heading = np.asarray(drawn.angular_velocity)[near] / rate[near, None]
+    decades = [-np.log10(angle[near]) / 6, -np.log10(rate[near] / 0.25) / 5]
+    degrees = np.rad2deg(angle[~near])
+    for numbers in (
+        [*decades, *uniforms(axis[near]), *uniforms(heading)],
+        [*uniforms(axis[~near]), (degrees - 30) / 120],
+    ):
+        count = len(numbers[0])
+        for x in numbers:
+            counts, _ = np.histogram(x, np.linspace(0, 1, 11))
+            np.testing.assert_allclose(counts, count / 10, atol=5 * np.sqrt(0.09 * count))
+            np.testing.assert_allclose([min(x), max(x)], [0, 1], atol=1e-3)
+        related = np.corrcoef(numbers) - np.eye(len(numbers))
+        assert np.abs(related).max() < 5 / np.sqrt(count)
+
+
+def test_a_share_of_none_is_none(monkeypatch):
+    """Though the number that decides may be 0."""
+    monkeypatch.setattr(jax.random, "uniform", lambda key, shape, dtype: jnp.zeros(shape, dtype))
+    none = spacecraft.NearGoalStarts(share=0.0, steps=64)
+    start = none(jax.random.key(0), spacecraft.default_params())
+    assert not start.angular_velocity.any() and start.time == 0
+    assert hash(none) == hash(spacecraft.NearGoalStarts(share=0.0, steps=64))  # a static argument
+
+
+def test_parameters_may_be_arguments_of_a_jitted_step():
+    """All but torque_held are traced; what is left out of them is the paper's."""
+    whole = spacecraft.default_params(20)
+    names = [f for f in whole.__dataclass_fields__ if f not in ("frameskip", "torque_held")]
+    params = attjax.EnvParams(**{name: getattr(whole, name) for name in names})
+    assert params.frameskip is None and params.torque_held is False
+    start = jax.tree.map(lambda x: x[0], states(1))
+    after = jax.jit(attjax.step, static_argnames="frameskip")(start, 1, params)
+    held = jax.jit(attjax.step)(start, 1, params.replace(torque_held=True))
+    kick = 0.5 / 240 / 0.872
+    assert float(after.angular_velocity[0]) == pytest.approx(kick, rel=1e-5)
+    assert float(held.angular_velocity[0]) == pytest.approx(21 * kick, rel=1e-4)
+    default = spacecraft.default_params()
+    jax.tree.map(np.testing.assert_array_equal, default, whole)
+
+
+@pytest.mark.parametrize(
+    "name, allowed, refused, wrong",
+    [
+        ("inertia", [1.0, 1.0, 2.0], [1.0, 1.0, 2.1], "inertia has principal moments"),
+        ("torque_table", np.ones((2, 3)), np.ones((2, 2)), "must be (n, 3)"),
+        ("rate_limit", 0.5, 0.0, "rate_limit is 0; it must be above 0"),
+        ("rate_limit", 1e-3, -0.5, "rate_limit is -0.5; it must be above 0"),
+        ("goal_angle", 0.5, 0.0, "goal_angle is 0; it must be above 0"),
+        ("goal_angle", 1e-3, -0.5, "goal_angle is -0.5; it must be above 0"),
+        ("min_slew_angle", 0.0, -0.1, "min_slew_angle is -0.1; it must be at least 0"),
+        ("max_slew_angle", np.pi / 6, 0.5, "max_slew_angle is 0.5; it must be at least 0.52359"),
+        ("max_steps_in_episode", 1, 0, "it must be from 1 to 2147483647"),
+        ("max_steps_in_episode", 2**31 - 1, -1, "it must be from 1 to 2147483647"),
+        ("frameskip", 0, -1, "params.frameskip is -1; it must be from 0 to 20"),
+        ("frameskip", 20, 21, "params.frameskip is 21; it must be from 0 to 20"),
+        ("torque_held", True, 1, "params.torque_held is 1; it must be True or False"),
+        ("torque_held", False, None, "params.torque_held is None; it must be True or False"),
+    ],
+)
+def test_parameters_at_the_edge_pass_and_beyond_it_are_refused(name, allowed, refused, wrong):
+    params = spacecraft.default_params()
+    spacecraft.check_params(params.replace(**{name: allowed}), 20)
+    with pytest.raises(ValueError) as error:
+        spacecraft.check_params(params.replace(**{name: refused}), 20)
+    assert wrong in str(error.value)
+
+
+def test_an_action_beyond_the_table_is_refused():
+    start = jax.tree.map(lambda x: x[0], states(1))
+    for action in (0, 18):
+        attjax.step(start, action)
+    for action in (-1, 19):
+        with pytest.raises(ValueError, match=f"action is {action}; it must be from 0 to 18"):
+            attjax.step(start, action)
