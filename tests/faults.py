@@ -107,11 +107,11 @@ FAULTS = {
     ),
     "sign in TABLE_5": (
         "evaluation.py", '"slew2": (0.44228, -0.44228', '"slew2": (0.44228, 0.44228',
-        ["test_evaluation.py"],
+        ["test_slew_references.py"],
     ),
     "factor of the time-optimal reference": (
         "evaluation.py", "return 2 * numerics.square_root(jnp.sum(momentum)",
-        "return 3 * numerics.square_root(jnp.sum(momentum)", ["test_evaluation.py"],
+        "return 3 * numerics.square_root(jnp.sum(momentum)", ["test_slew_references.py"],
     ),
     "reward_scale ignored": (
         "rollout.py", "reward * setup.settings.reward_scale", "reward", ["test_rollout.py"],
@@ -147,7 +147,7 @@ FAULTS = {
     ),
     "observation bound without coasting": (
         "env.py", "(params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))",
-        "(params.rate_limit + kick)", ["test_env.py"],
+        "(params.rate_limit + kick)", ["test_observation_space.py"],
     ),
     "optimizer not restored": (
         "checkpoint.py", "    return restored.replace(key=",
