@@ -106,8 +106,7 @@ def fly(
         rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2, axis=-1))
         torque = jnp.sqrt(jnp.sum(params.torque_table[action] ** 2, axis=-1))
         closer = angle < so_far.closest_angle
-        score = numerics.add((so_far.score, excess[0]), info["score"])
-        impulse = numerics.add((so_far.impulse, excess[1]), torque * context.torque_duration)
+        impulse, excess = numerics.add((so_far.impulse, excess), torque * context.torque_duration)
         updated = Episodes(
             closest_angle=jnp.where(closer, angle, so_far.closest_angle),
             closest_rate=jnp.where(closer, rate, so_far.closest_rate),
@@ -115,17 +114,17 @@ def fly(
             terminal_rate=rate,
             overspeed=terminated,
             last_outside=jnp.where(angle > params.goal_angle, index + 1, so_far.last_outside),
-            score=score[0],
-            impulse=impulse[0],
+            score=so_far.score + info["score"],
+            impulse=impulse,
         )
         ended = so_far.overspeed
         so_far = jax.tree.map(lambda old, new: jnp.where(ended, old, new), so_far, updated)
-        return next_observation, next_state, so_far, (score[1], impulse[1])
+        return next_observation, next_state, so_far, excess
 
     zero = jnp.zeros(episodes, observation.dtype)
     start = Episodes(zero + jnp.inf, zero, zero, zero, zero > 0, zero.astype(jnp.int32), zero, zero)
     steps = params.max_steps_in_episode
-    return jax.lax.fori_loop(0, steps, step, (observation, state, start, (zero, zero)))[2]
+    return jax.lax.fori_loop(0, steps, step, (observation, state, start, zero))[2]
 
 
 @functools.partial(jax.jit, static_argnames=("env", "steps"))

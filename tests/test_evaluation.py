@@ -82,17 +82,13 @@ def test_summary_agrees_with_numpy():
     assert evaluation.summarize(np.array([])) == dict.fromkeys(summary)
 
 
-def test_sums_over_a_long_episode_do_not_drift():
-    """200,000 steps in single precision, each the same: the sums in closed form."""
-    heavy = Spacecraft(inertia=(1e6, 1e6, 1e6), duration=200_000 / 240, slew_angles_deg=(90, 90))
+def test_the_impulse_of_a_long_episode_does_not_drift():
+    """200,000 steps in single precision, each the same: the sum in closed form."""
+    heavy = Spacecraft(inertia=(1e6, 1e6, 1e6), duration=200_000 / 240)
     env = AttitudeEnv(0, spacecraft=heavy)
     push = jax.tree_util.Partial(lambda observation, context: jnp.array(7))  # 0.05 N m
     flown = evaluation.fly(push, env, env.default_params, jax.random.key(0), 1)
     np.testing.assert_allclose(flown.impulse, 0.05 / 240 * 200_000, rtol=2e-7)
-    still = jax.tree_util.Partial(coast)
-    flown = evaluation.fly(still, env, env.default_params, jax.random.key(0), 1)
-    expected = (np.exp(-0.25 / 0.14) - 1) * 199_999  # Eq. 12 at 90°; the last step earns 0
-    np.testing.assert_allclose(flown.score, expected, rtol=1e-6)
 
 
 def test_the_closest_sample_is_kept_with_its_rate():
