@@ -64,8 +64,7 @@ def main(argv=None) -> int:
         flight = _flight_policy(arguments)
         names = [c_names.renamed(name, arguments.prefix) for name in module.FILES]
         _prepare(arguments.out, names, arguments.overwrite)
-        trained = run_folder.read_config(arguments.checkpoint).settings.frameskips
-        cli.warn_of_untrained("export.py", flight.env.frameskip, trained)
+        cli.warn_of_untrained("export.py", flight.env.frameskip, flight.origin.frameskips)
         with _exporting(arguments.checkpoint):
             contents = module.files(flight, arguments.seed or 0, arguments.prefix)
         with run_folder.writing(arguments.out):

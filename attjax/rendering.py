@@ -3,11 +3,12 @@
 Matplotlib draws into memory with a canvas of its own; its global state stays as it is.
 """
 
-import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
+
+from attjax import canvas
 
 DPI = 100
 WIDTH, HEIGHT = 640, 360
@@ -40,8 +41,7 @@ class Renderer:
         self._curves = np.full((2, max_steps + 1, num_envs), np.nan)
         self._now = np.full(num_envs, -1)
         self._box = box(inertia)
-        with matplotlib.rc_context():
-            matplotlib.rcdefaults()
+        with canvas.own_style():
             self._draw_background(rate_limit, np.rad2deg(goal_angle))
 
     def record(self, quaternion, angular_velocity, time) -> None:
