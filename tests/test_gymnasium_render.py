@@ -73,8 +73,9 @@ def test_stepping_on_after_the_end_can_be_drawn():
 
 def test_a_missing_package_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    monkeypatch.delitem(sys.modules, "attjax.rendering", raising=False)
-    monkeypatch.delattr(attjax, "rendering", raising=False)
+    for name in ("rendering", "canvas"):  # as if neither had been imported before
+        monkeypatch.delitem(sys.modules, f"attjax.{name}", raising=False)
+        monkeypatch.delattr(attjax, name, raising=False)
     for make in (SlewEnv, SlewVectorEnv):
         make()
         with pytest.raises(DependencyNotInstalled, match=r"^render_mode='rgb_array' needs mat"):
