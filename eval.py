@@ -206,7 +206,7 @@ def _trained(arguments, names):
     if arguments.frameskip is not None:
         _check_duration(arguments.duration, arguments.frameskip)
     if POLICY in names:
-        return run_folder.read_config(arguments.checkpoint).settings.frameskips
+        return run_folder.read_config(arguments.checkpoint).settings.task.frameskips
     return None
 
 

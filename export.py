@@ -97,10 +97,10 @@ def _flight_policy(arguments):
     policy, params = checkpoint.restore_network(folder, update)
     if callable(policy.features) and arguments.format != "stablehlo":
         raise errors.UserError(
-            f"the policy in {folder} sees {config.settings.features}, which --format "
+            f"the policy in {folder} sees {config.settings.network.features}, which --format "
             f"{arguments.format} does not know; stablehlo does"
         )
-    frameskip = cli.frameskip(arguments.frameskip, config.settings.frameskips)
+    frameskip = cli.frameskip(arguments.frameskip, config.settings.task.frameskips)
     with _exporting(folder):
         env = AttitudeEnv(frameskip, spacecraft=config.spacecraft)
         return FlightPolicy(policy, params, env, provenance.of_run(config, update, newest))

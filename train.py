@@ -4,7 +4,7 @@ import dataclasses
 import importlib
 import sys
 
-from attjax import cli, config_file, errors, presets, run_folder, settings, signals
+from attjax import cli, config_file, errors, fields, presets, run_folder, signals
 from attjax.specification import LM50
 
 DEFAULT_PRESET = "precise"
@@ -26,7 +26,7 @@ examples:
 
 def parse_arguments(argv):
     parser = cli.Parser(prog="train.py", usage=USAGE, description=__doc__, epilog=EXAMPLES)
-    groups = {name: parser.add_argument_group(title) for name, title in settings.GROUPS.items()}
+    groups = {name: parser.add_argument_group(title) for name, title in fields.GROUPS.items()}
     preset_help = f"the recipe; flags override it (default: {DEFAULT_PRESET})"
     groups["run"].add_argument("--preset", choices=presets.PRESETS, help=preset_help)
     craft_help = "TOML file that describes the spacecraft and its task (default: LM50, the paper's)"
@@ -104,8 +104,7 @@ def _given(arguments):
 
 
 def _new_config(preset=DEFAULT_PRESET, seed=0, spacecraft=LM50, **settings):
-    settings = dataclasses.replace(presets.PRESETS[preset], **settings)
-    return run_folder.Config(preset, seed, settings, spacecraft)
+    return run_folder.Config(preset, seed, presets.PRESETS[preset].replace(**settings), spacecraft)
 
 
 def _open(arguments, given, new, stop):
@@ -142,20 +141,18 @@ def _setup(config):
 
 def _resumed_config(given, config):
     """What the folder's run was started with, with a larger total if one was asked for."""
-    total = given.get("total_steps", config.settings.total_steps)
-    run = vars(config) | dataclasses.asdict(config.settings) | {"total_steps": total}
+    total = given.get("total_steps", config.settings.ppo.total_steps)
+    run = vars(config) | config.settings.flat | {"total_steps": total}
     differing = [name for name, value in given.items() if run[name] != value]
     if differing:
         listed = ", ".join(f"{name} ({run[name]})" for name in differing)
         raise errors.UserError(f"--resume keeps the run's settings; leave out {listed}")
-    if total < config.settings.total_steps:
+    if total < config.settings.ppo.total_steps:
         raise errors.UserError(
             f"--total-steps is {total}; to resume, it must be at least the run's "
-            f"{config.settings.total_steps}"
+            f"{config.settings.ppo.total_steps}"
         )
-    return dataclasses.replace(
-        config, settings=dataclasses.replace(config.settings, total_steps=total)
-    )
+    return dataclasses.replace(config, settings=config.settings.replace(total_steps=total))
 
 
 if __name__ == "__main__":

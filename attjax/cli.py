@@ -2,14 +2,13 @@
 
 import argparse
 import contextlib
-import dataclasses
 import functools
 import os
 import shlex
 import sys
 from pathlib import Path
 
-from attjax import errors, help_text, jax_setup, settings
+from attjax import errors, fields, help_text, jax_setup, settings
 
 DEVICES = ("auto", "cpu", "gpu")
 TABLE_2 = 5
@@ -58,7 +57,7 @@ def add_best(group) -> None:
 
 def add_seed_and_device(group, seed_help: str) -> None:
     """Add --seed and --device."""
-    add_number(group, "seed", int, None, f"{seed_help} (default: 0)", **settings.SEED)
+    add_number(group, "seed", int, None, f"{seed_help} (default: 0)", **fields.SEED)
     device_help = "where to compute (default: auto, a GPU if JAX finds one)"
     group.add_argument("--device", choices=DEVICES, default="auto", help=device_help)
 
@@ -67,7 +66,7 @@ def add_frameskip(group, meaning: str) -> None:
     """Add --frameskip, None where it is not given: :func:`frameskip` then chooses."""
     default = f"{TABLE_2} as in Table 2 if that was trained, else the trained one nearest to it"
     help = f"{meaning} (default: {default})"
-    add_number(group, "frameskip", int, None, help, **settings.FRAMESKIP)
+    add_number(group, "frameskip", int, None, help, **fields.FRAMESKIP)
 
 
 def frameskip(given: int | None, trained: tuple[int, ...] | None) -> int:
@@ -97,8 +96,8 @@ def warn_of_untrained(prog: str, frameskip: int, trained: tuple[int, ...] | None
 
 
 def add_number(group, name: str, kind: type, default, help: str, **details) -> None:
-    """Add the flag of a number with details as in :func:`attjax.settings.setting`."""
-    field = settings.single(name, kind, help, **details)
+    """Add the flag of a number with details as in :func:`attjax.fields.setting`."""
+    field = fields.single(name, kind, help, **details)
     help = help_text.meaning(field)
     group.add_argument(
         "--" + name,
@@ -111,7 +110,7 @@ def add_number(group, name: str, kind: type, default, help: str, **details) -> N
 
 def add_settings(group, name: str) -> None:
     """Add a flag for every setting of a group; those not given are left out of the namespace."""
-    for field in dataclasses.fields(settings.Settings):
+    for field in settings.FIELDS.values():
         if field.metadata["group"] != name:
             continue
         flag = "--" + field.name.replace("_", "-")
@@ -140,15 +139,14 @@ def _parse(field, text):
     except ValueError:
         value = text
     try:
-        return settings.check(field, value)
+        return fields.check(field, value)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def overrides(arguments: argparse.Namespace) -> dict:
     """The settings that were given on the command line."""
-    names = {field.name for field in dataclasses.fields(settings.Settings)}
-    return {name: value for name, value in vars(arguments).items() if name in names}
+    return {k: value for k, value in vars(arguments).items() if k in settings.FIELDS}
 
 
 def select_device(name: str):

@@ -37,8 +37,8 @@ def meaning(field: dataclasses.Field) -> str:
     """What a setting is: symbol, meaning, unit.
 
     Example:
-        >>> from attjax.settings import Settings
-        >>> meaning(Settings.__dataclass_fields__["discount"])
+        >>> from attjax.settings import FIELDS
+        >>> meaning(FIELDS["discount"])
         'γ: discount of later rewards (Eq. 2)'
     """
     symbol, unit = field.metadata["symbol"], field.metadata["unit"]

@@ -9,7 +9,7 @@ import functools
 import jax
 import jax.numpy as jnp
 
-from attjax import vector
+from attjax import sharding, vector
 
 
 @functools.partial(jax.jit, static_argnames="env")
@@ -51,7 +51,7 @@ def choose(mask, new, old):
     jax.jit,
     static_argnames="env",
     donate_argnames="states",
-    compiler_options=vector.COMPILER_OPTIONS,
+    compiler_options=sharding.COMPILER_OPTIONS,
 )
 def step_batch(env, params, key, states, actions):
     """One agent step of all spacecraft, ended episodes restarted; the states are donated.
@@ -72,7 +72,7 @@ def step_batch(env, params, key, states, actions):
     jax.jit,
     static_argnames="env",
     donate_argnames="states",
-    compiler_options=vector.COMPILER_OPTIONS,
+    compiler_options=sharding.COMPILER_OPTIONS,
 )
 def step_batch_later_reset(env, params, key, states, actions, ended):
     """One agent step of the spacecraft that have not ended, and a new episode for the others.

@@ -24,7 +24,7 @@ try:
 except ImportError:  # Windows, where runs are not kept apart
     fcntl = None
 
-FORMAT = 5
+FORMAT = 6
 CONFIG, METRICS = belongings.CONFIG, belongings.METRICS
 LOST = "lost+found"
 
@@ -48,7 +48,7 @@ class Config:
 
     def __post_init__(self):
         object.__setattr__(self, "seed", operator.index(self.seed))
-        longest = max(self.settings.frameskips)
+        longest = max(self.settings.task.frameskips)
         if self.spacecraft.max_steps(longest) < 1:
             raise ValueError(
                 f"frameskips holds {longest}; in {self.spacecraft.duration} s, the duration of an "
@@ -195,6 +195,7 @@ def read_config(folder: Path) -> Config:
         raise FolderError(f"{folder} is no attjax checkpoint: it has no {CONFIG}")
     content = _read_json(path)
     try:
+        content = UPGRADES.get(content["format"], dict)(content)
         if content["format"] != FORMAT:
             raise FolderError(
                 f"{path} has format {content['format']}; this version of attjax reads {FORMAT}"
@@ -207,6 +208,16 @@ def read_config(folder: Path) -> Config:
         )
     except (ValueError, KeyError, TypeError, OverflowError) as error:
         raise FolderError(f"{path} cannot be read: {error!r}") from None
+
+
+def _by_subject(content):
+    """Format 5 had the settings in one table."""
+    by_subject = dataclasses.asdict(settings.from_flat(content["settings"]))
+    return content | {"format": 6, "settings": by_subject}
+
+
+UPGRADES = {5: _by_subject}
+"""What makes the content of an earlier format one of the present format."""
 
 
 def _read_json(path):

@@ -7,7 +7,6 @@ Only tensorboardX's protocol buffers and checksum are used: its writers work in 
 full disk ends in a traceback, and put hyperparameters into a further run beside the curves.
 """
 
-import dataclasses
 import struct
 import time
 from pathlib import Path
@@ -99,7 +98,7 @@ def _head(wall_time, config):
     yield Event(wall_time=wall_time, file_version="brain.Event:2")
     yield Event(wall_time=wall_time, session_log=SessionLog(status=SessionLog.START))
     values = {"preset": config.preset, "seed": config.seed, "spacecraft": config.spacecraft.name}
-    values |= dataclasses.asdict(config.settings)
+    values |= config.settings.flat
     shown = {k: ",".join(map(str, v)) if isinstance(v, tuple) else v for k, v in values.items()}
     # The session's end is left out: it would say that the run has ended, and how.
     for summary in hparams(shown, dict.fromkeys(TAGS[name] for name in COMPARED))[:2]:

@@ -40,12 +40,12 @@ class Run:
     @property
     def agent_steps(self) -> int:
         """Agent steps done."""
-        return self.update * self.settings.steps_per_update
+        return self.update * self.settings.ppo.steps_per_update
 
     @property
     def goes_on(self) -> bool:
         """Whether there is another block to run."""
-        return self.update < self.settings.num_updates and self.stop.received is None
+        return self.update < self.settings.ppo.num_updates and self.stop.received is None
 
     def describe(self, device) -> None:
         """Print what the run is, and where it stands."""
@@ -53,8 +53,8 @@ class Run:
         craft = self.config.spacecraft
         print(
             f"preset {self.config.preset}, {craft.name}, seed {self.config.seed}, "
-            f"{settings.num_updates * settings.steps_per_update:,} agent steps "
-            f"({settings.num_updates:,} updates of {settings.steps_per_update:,}) on "
+            f"{settings.ppo.num_updates * settings.ppo.steps_per_update:,} agent steps "
+            f"({settings.ppo.num_updates:,} updates of {settings.ppo.steps_per_update:,}) on "
             f"{self.setup.num_devices} x {device.device_kind} ({device.platform}), in {self.folder}"
         )
         if self.update:
@@ -73,12 +73,13 @@ class Run:
 
     def announce_longer(self, before: Settings) -> None:
         """Print what a larger total than ``before``'s changes from here on."""
-        steps = self.update * self.settings.passes * self.settings.minibatches
-        old, new = (learner.learning_rate(s, steps) for s in (before, self.settings))
+        old, new = before.ppo, self.settings.ppo
+        steps = self.update * new.passes * new.minibatches
+        slow, fast = (learner.learning_rate(ppo, steps) for ppo in (old, new))
         print(
-            f"total steps raised from {before.total_steps:,} to {self.settings.total_steps:,}: "
-            f"at {self.agent_steps:,} the learning rate goes from {old:.3g} to {new:.3g}, and from "
-            f"there to {self.settings.final_learning_rate:.3g} at the new end; the entropy bonus "
+            f"total steps raised from {old.total_steps:,} to {new.total_steps:,}: "
+            f"at {self.agent_steps:,} the learning rate goes from {slow:.3g} to {fast:.3g}, "
+            f"and from there to {new.final_learning_rate:.3g} at the new end; the entropy bonus "
             f"likewise"
         )
 
@@ -89,7 +90,7 @@ class Run:
             FolderError: the folder cannot be written. Its checkpoints are as they were.
         """
         train_block = self._compiled(debug_nans) if self.goes_on else None
-        total = self.settings.num_updates * self.settings.steps_per_update
+        total = self.settings.ppo.num_updates * self.settings.ppo.steps_per_update
         rows = self.metrics_file.kept
         with checkpoint.Saver(self.folder) as saver:
             with progress.Progress(total, self.agent_steps, rows, self.stop) as view:
@@ -119,7 +120,9 @@ class Run:
         """Run blocks until the end or a signal; returns what diverged, if anything."""
         start, saved = time.monotonic() - self.metrics_file.wall_s, time.monotonic()
         while self.goes_on:
-            count = min(self.settings.updates_per_block, self.settings.num_updates - self.update)
+            count = min(
+                self.settings.logging.updates_per_block, self.settings.ppo.num_updates - self.update
+            )
             try:
                 self.learner, block = train_block(self.env_params, self.learner, count)
             except nan_search.NotFinite as found:
@@ -131,7 +134,7 @@ class Run:
                 return self._divergence(first, 1, names)
             self.update += count
             row = metrics.block_row(
-                block, self.settings.frameskips, self.agent_steps, time.monotonic() - start
+                block, self.settings.task.frameskips, self.agent_steps, time.monotonic() - start
             )
             self.terminal_error = row["terminal_error_deg"]
             for log in self.logs:
@@ -144,7 +147,7 @@ class Run:
 
     def _divergence(self, update, count, what):
         """One line that says in which of the updates what was not finite."""
-        steps = (update + count) * self.settings.steps_per_update
+        steps = (update + count) * self.settings.ppo.steps_per_update
         updates = f"update {update}" if count == 1 else f"updates {update} to {update + count - 1}"
         kept = checkpoint.latest(self.folder)
         kept = "no checkpoint yet" if kept is None else f"the good one of update {kept}"

@@ -7,7 +7,6 @@ Example:
 """
 
 import argparse
-import dataclasses
 import json
 import os
 import resource
@@ -127,7 +126,7 @@ def train(hidden_sizes: list[int], minibatch_size: int, cores: int) -> dict:
     from attjax import assembly, learner, ppo, presets
 
     changes = {"hidden_sizes": tuple(hidden_sizes), "minibatch_size": minibatch_size}
-    settings = dataclasses.replace(presets.PRECISE, **changes)
+    settings = presets.PRECISE.replace(**changes)
     setup = assembly.setup(settings, num_devices=cores)
     env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(0))
@@ -136,7 +135,7 @@ def train(hidden_sizes: list[int], minibatch_size: int, cores: int) -> dict:
         start = time.perf_counter()
         state, _ = jax.block_until_ready(ppo.train_block(setup, env_params, state, 1))
         durations.append(time.perf_counter() - start)
-    rates = [settings.steps_per_update / duration for duration in durations[1:]]
+    rates = [settings.ppo.steps_per_update / duration for duration in durations[1:]]
     return {"compile_s": durations[0] - min(durations[1:]), **common.summary(rates)}
 
 

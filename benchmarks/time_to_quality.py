@@ -178,7 +178,7 @@ class Examiner:
         settings = run_folder.read_config(self._folder).settings
         return Point(
             seconds=round(seconds, 1),
-            agent_steps=update * settings.steps_per_update,
+            agent_steps=update * settings.ppo.steps_per_update,
             episode_return=mean_return,
             mean_error=at_40_hz["terminal"]["error_deg"]["mean"],
             max_error=at_40_hz["terminal"]["error_deg"]["max"],

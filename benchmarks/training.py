@@ -126,7 +126,7 @@ def prepare_attjax(workload: Workload):
 
     from attjax import assembly, learner, ppo, presets
 
-    settings = dataclasses.replace(presets.PAPER_FAST, **dataclasses.asdict(workload))
+    settings = presets.PAPER_FAST.replace(**dataclasses.asdict(workload))
     setup = assembly.setup(settings)
     env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(0))

@@ -67,8 +67,8 @@ FAULTS = {
         "losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", ["test_losses.py"],
     ),
     "annealing off by one": (
-        "learner.py", "gradient_steps = settings.num_updates * settings.passes",
-        "gradient_steps = (settings.num_updates - 1) * settings.passes", LEARNING,
+        "learner.py", "settings.final_learning_rate, settings.gradient_steps",
+        "settings.final_learning_rate, settings.gradient_steps - settings.minibatches", LEARNING,
     ),
     "key reused from update to update": (
         "rollout.py", "return learner.replace(key=key), steps", "return learner, steps", LEARNING,
@@ -87,7 +87,7 @@ FAULTS = {
         "fresh = jax.vmap(reset)(jax.random.split(jax.random.key(0), portion), rows)", LEARNING,
     ),
     "devices draw the same numbers": (
-        "rollout.py", "jax.random.fold_in(device_key, jax.lax.axis_index(vector.AXIS))",
+        "rollout.py", "jax.random.fold_in(device_key, jax.lax.axis_index(sharding.AXIS))",
         "jax.random.fold_in(device_key, 0)", LEARNING,
     ),
     "closest angle is the last": (
@@ -114,7 +114,7 @@ FAULTS = {
         "return 3 * numerics.square_root(jnp.sum(momentum)", ["test_slew_references.py"],
     ),
     "reward_scale ignored": (
-        "rollout.py", "reward * setup.settings.reward_scale", "reward", ["test_rollout.py"],
+        "rollout.py", "*= setup.settings.task.reward_scale", "*= 1.0", ["test_rollout.py"],
     ),
     "max_gradient_norm ignored": (
         "learner.py", "if settings.max_gradient_norm > 0:", "if False:", DESCENT,
@@ -130,7 +130,7 @@ FAULTS = {
         "jnp.stack([pass_key] * settings.passes)", DESCENT,
     ),
     "same shuffle on each device": (
-        "descent.py", "jax.random.fold_in(pass_key, jax.lax.axis_index(vector.AXIS))",
+        "descent.py", "jax.random.fold_in(pass_key, jax.lax.axis_index(AXIS))",
         "jax.random.fold_in(pass_key, 0)", DESCENT,
     ),
     "approximate KL without its ratio": (

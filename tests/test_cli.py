@@ -160,7 +160,7 @@ def test_a_larger_total_anneals_on_and_says_so(trained, tmp_path, capsys):
     output = capsys.readouterr().out
     assert "total steps raised from 7,680 to 15,360" in output
     assert "at 7,680 the learning rate goes from 1e-06 to 0.001, and" in output
-    assert run_folder.read_config(folder).settings.total_steps == 15_360
+    assert run_folder.read_config(folder).settings.ppo.total_steps == 15_360
     assert checkpoint.latest(folder) == 120
 
 

@@ -104,9 +104,9 @@ def test_hyperparameters_are_all_of_the_run(tmp_path):
     assert set(shown) == {"preset", "seed", "spacecraft", *vars(CONFIG.settings)}
     assert shown["spacecraft"].string_value == "LM50"
     assert shown["preset"].string_value == CONFIG.preset
-    assert shown["clip"].number_value == CONFIG.settings.clip
-    assert shown["frameskips"].string_value == ",".join(map(str, CONFIG.settings.frameskips))
-    assert shown["stagger_episodes"].bool_value is CONFIG.settings.stagger_episodes
+    assert shown["clip"].number_value == CONFIG.settings.ppo.clip
+    assert shown["frameskips"].string_value == ",".join(map(str, CONFIG.settings.task.frameskips))
+    assert shown["stagger_episodes"].bool_value is CONFIG.settings.task.stagger_episodes
     (value,) = experiment.summary.value
     data = HParamsPluginData.FromString(value.metadata.plugin_data.content)
     assert {m.name.tag for m in data.experiment.metric_infos} <= set(tensorboard.TAGS.values())
