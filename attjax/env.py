@@ -159,6 +159,13 @@ class AttitudeEnv:
         observation = observations.observe(next_state.quaternion, next_state.angular_velocity)
         return observation, next_state, self.reward(transition), terminated, info
 
+    def starts_whole(self, state: EnvState) -> chex.Array:
+        """Whether the episode that begins with this state is one of the task's: a bool a state.
+
+        The others, practice from the middle of it, count in no metric.
+        """
+        return spacecraft.starts_whole(state)
+
     def observation_space(self, params: EnvParams) -> spaces.Box:
         """Bounds of Eq. 11 up to the step that exceeds the rate limit.
 
