@@ -128,10 +128,13 @@ class AttitudeEnv:
         Returns:
             Observation (11,), state, reward, terminated, info. ``info["score"]`` is the
             reward of Eq. 12–13 whatever the environment's own; ``info["outcome"]`` describes
-            the spacecraft after the step and is meant to be read at an episode's end.
+            the spacecraft after the step and is meant to be read at an episode's end;
+            ``info["torque"]``, (3,), N m, body frame, is what acted for the context's
+            ``torque_duration``.
         """
         del key
         next_state = spacecraft.step(state, action, params, self.frameskip)
+        torque = spacecraft.applied_torque(action, params)
         rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2))
         terminated = rate > params.rate_limit
         truncated = ~terminated & (next_state.time >= params.max_steps_in_episode)
@@ -143,13 +146,14 @@ class AttitudeEnv:
             truncated=truncated,
             goal_angle=params.goal_angle,
             control_period=self._period(params),
-            impulse=params.torque_table[action] * self.context(params).torque_duration,
+            impulse=torque * self.context(params).torque_duration,
         )
         angle = quaternions.error_angle(next_state.quaternion)
         info = {
             "terminated": terminated,
             "truncated": truncated,
             "score": paper_reward(transition),
+            "torque": torque,
             "outcome": {
                 "success_rate": (truncated & (angle <= params.goal_angle)).astype(rate.dtype),
                 "overspeed_rate": terminated.astype(rate.dtype),

@@ -104,7 +104,7 @@ def fly(
         )(key, state, action, params)
         angle = jax.vmap(quaternions.error_angle)(next_state.quaternion)
         rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2, axis=-1))
-        torque = jnp.sqrt(jnp.sum(params.torque_table[action] ** 2, axis=-1))
+        torque = jnp.sqrt(jnp.sum(info["torque"] ** 2, axis=-1))
         closer = angle < so_far.closest_angle
         impulse, excess = numerics.add((so_far.impulse, excess), torque * context.torque_duration)
         updated = Episodes(
@@ -139,7 +139,8 @@ def record(
         state = jax.vmap(
             lambda state, action: spacecraft.step(state, action, params, env.frameskip)
         )(state, action)
-        return state, History(state.quaternion, state.angular_velocity, params.torque_table[action])
+        torque = jax.vmap(spacecraft.applied_torque, (0, None))(action, params)
+        return state, History(state.quaternion, state.angular_velocity, torque)
 
     return jax.lax.scan(step, start, length=steps)[1]
 

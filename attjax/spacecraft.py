@@ -165,6 +165,23 @@ def _direction(u):
     return jnp.stack([sine * jnp.cos(azimuth), sine * jnp.sin(azimuth), cosine])
 
 
+def applied_torque(action: chex.Array, params: EnvParams) -> chex.Array:
+    """The torque that an action gives: the one way from a decision to what turns the spacecraft.
+
+    Args:
+        action: integer scalar, row of the torque table (Table 1).
+        params: of the spacecraft.
+
+    Returns:
+        (3,) torque, body frame, N m, for as long as the environment's context says.
+
+    Example:
+        >>> applied_torque(4, default_params()).tolist()
+        [0.0, -0.5, 0.0]
+    """
+    return params.torque_table[action]
+
+
 def step(
     state: EnvState,
     action,
@@ -199,7 +216,7 @@ def step(
     quaternion, angular_velocity = dynamics.propagate(
         checks.unit_quaternion("quaternion", state.quaternion),
         state.angular_velocity,
-        params.torque_table[action],
+        applied_torque(action, params),
         params.inertia,
         frameskip,
         params.frameskip,
