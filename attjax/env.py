@@ -6,6 +6,7 @@ from collections.abc import Callable
 import chex
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from attjax import observation as observations
 from attjax import quaternion as quaternions
@@ -15,6 +16,13 @@ from attjax.reward import Transition, paper_reward
 from attjax.spacecraft import EnvParams, EnvState
 from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft
 from attjax.values import integer
+
+_FIRST_OBSERVATION = np.uint32(2**32 - 1)
+"""What ``fold_in`` derives a key with that shares nothing with the one it comes from.
+
+``uniform``, ``split`` and ``fold_in`` all encrypt numbers with the key: the first two 0, 1, 2, …,
+the last the one that it is given, which must therefore be one that no draw counts up to.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,7 +97,7 @@ class AttitudeEnv:
         params = self.default_params if params is None else params
         spacecraft.check_params(params, self.frameskip)
         state = self.initial_state(key, params)
-        return observations.observe(state.quaternion, state.angular_velocity), state
+        return self.observe(observation_key(key), state, params), state
 
     reset_env = reset
 
@@ -132,7 +140,6 @@ class AttitudeEnv:
             ``info["torque"]``, (3,), N m, body frame, is what acted for the context's
             ``torque_duration``.
         """
-        del key
         next_state = spacecraft.step(state, action, params, self.frameskip)
         torque = spacecraft.applied_torque(action, params)
         rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2))
@@ -160,8 +167,19 @@ class AttitudeEnv:
                 "terminal_error_deg": jnp.rad2deg(angle),
             },
         }
-        observation = observations.observe(next_state.quaternion, next_state.angular_velocity)
+        observation = self.observe(key, next_state, params)
         return observation, next_state, self.reward(transition), terminated, info
+
+    def observe(self, key: chex.PRNGKey, state: EnvState, params: EnvParams) -> chex.Array:
+        """What an agent is told of a state: the observation (11,) of Eq. 11.
+
+        Args:
+            key: for what is random in it; here nothing is.
+            state: of one spacecraft.
+            params: its parameters.
+        """
+        del key, params
+        return observations.observe(state.quaternion, state.angular_velocity)
 
     def starts_whole(self, state: EnvState) -> chex.Array:
         """Whether the episode that begins with this state is one of the task's: a bool a state.
@@ -186,3 +204,8 @@ class AttitudeEnv:
     def action_space(self, params: EnvParams | None = None) -> spaces.Discrete:
         """The rows of the torque table."""
         return spaces.Discrete(self.num_actions if params is None else len(params.torque_table))
+
+
+def observation_key(key: chex.PRNGKey) -> chex.PRNGKey:
+    """The key of an episode's first observation, from the key of its reset."""
+    return jax.random.fold_in(key, _FIRST_OBSERVATION)

@@ -9,12 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import numerics, rigid_body, spacecraft
-from attjax import observation as observations
+from attjax import numerics, rigid_body
 from attjax import quaternion as quaternions
 from attjax.context import Context
 from attjax.controllers import average_torque
-from attjax.env import AttitudeEnv
+from attjax.env import AttitudeEnv, observation_key
 from attjax.spacecraft import EnvParams, EnvState
 from attjax.values import integer
 
@@ -129,20 +128,31 @@ def fly(
 
 @functools.partial(jax.jit, static_argnames=("env", "steps"))
 def record(
-    controller: Controller, env: AttitudeEnv, params: EnvParams, start: EnvState, steps: int
+    controller: Controller,
+    env: AttitudeEnv,
+    params: EnvParams,
+    key: chex.PRNGKey,
+    start: EnvState,
+    steps: int,
 ) -> History:
-    """Fly slews from a batch of states without ending them early, and keep every step."""
+    """Fly slews from a batch of states without ending them early, and keep every step.
 
-    def step(state, _):
-        observation = jax.vmap(observations.observe)(state.quaternion, state.angular_velocity)
-        action = jax.vmap(controller, (0, None))(observation, env.context(params))
-        state = jax.vmap(
-            lambda state, action: spacecraft.step(state, action, params, env.frameskip)
-        )(state, action)
-        torque = jax.vmap(spacecraft.applied_torque, (0, None))(action, params)
-        return state, History(state.quaternion, state.angular_velocity, torque)
+    Of slews of :func:`random_slews`, and with the same key, they are the flights of :func:`fly`.
+    """
+    keys = jax.random.split(key, len(start.time))
+    first = jax.vmap(lambda key, state: env.observe(observation_key(key), state, params))
+    context = env.context(params)
 
-    return jax.lax.scan(step, start, length=steps)[1]
+    def step(carry, index):
+        observation, state = carry
+        action = jax.vmap(controller, (0, None))(observation, context)
+        observation, state, _, _, info = jax.vmap(env.step_env, (0, 0, 0, None))(
+            keys, state, action, params
+        )
+        history = History(state.quaternion, state.angular_velocity, info["torque"])
+        return (observation, state), history
+
+    return jax.lax.scan(step, (first(keys, start), start), jnp.arange(steps))[1]
 
 
 def conditions(env: AttitudeEnv, params: EnvParams, seed: int, episodes: int) -> dict:
