@@ -17,8 +17,8 @@ from attjax.spacecraft import EnvParams, EnvState
 from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft
 from attjax.values import integer
 
-_FIRST_OBSERVATION = np.uint32(2**32 - 1)
-"""What ``fold_in`` derives a key with that shares nothing with the one it comes from.
+_OBSERVATION, _STEPS = np.uint32(2**32 - 1), np.uint32(2**32 - 2)
+"""What ``fold_in`` derives keys with that share nothing with the one they come from.
 
 ``uniform``, ``split`` and ``fold_in`` all encrypt numbers with the key: the first two 0, 1, 2, …,
 the last the one that it is given, which must therefore be one that no draw counts up to.
@@ -105,7 +105,7 @@ class AttitudeEnv:
         """One agent step; an episode that ends is followed by a fresh one.
 
         Args:
-            key: for the next episode's slew.
+            key: of this step, and of the next episode's start.
             state, action, params: as in :func:`attjax.step`.
 
         Returns:
@@ -118,7 +118,7 @@ class AttitudeEnv:
         """
         params = self.default_params if params is None else params
         observation, next_state, reward, terminated, info = self.step_env(
-            key, state, action, params
+            steps_key(key), state, action, params
         )
         truncated = info["truncated"]
         fresh_observation, fresh_state = self.reset_env(key, params)
@@ -208,4 +208,14 @@ class AttitudeEnv:
 
 def observation_key(key: chex.PRNGKey) -> chex.PRNGKey:
     """The key of an episode's first observation, from the key of its reset."""
-    return jax.random.fold_in(key, _FIRST_OBSERVATION)
+    return jax.random.fold_in(key, _OBSERVATION)
+
+
+def steps_key(key: chex.PRNGKey) -> chex.PRNGKey:
+    """The key of an episode's steps, from the key of its reset; a step's is folded in from it.
+
+    Example:
+        >>> key = steps_key(jax.random.key(0))
+        >>> third = jax.random.fold_in(key, 2)
+    """
+    return jax.random.fold_in(key, _STEPS)
