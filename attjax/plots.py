@@ -65,7 +65,8 @@ class Flight:
     def record(self, start: EnvState):
         """Time in s, (steps,), and the history of slews from the given states."""
         steps = int(self.params.max_steps_in_episode)
-        history = evaluation.record(self.controller, self.env, self.params, start, steps)
+        key = jax.random.key(self.seed)
+        history = evaluation.record(self.controller, self.env, self.params, key, start, steps)
         return np.arange(1, steps + 1) * self.env.control_period, history
 
 

@@ -20,14 +20,19 @@ def reset(env, params, key):
 
 
 @functools.partial(jax.jit, static_argnames="env", donate_argnames="state")
-def step(env, params, state, action):
+def step(env, params, key, state, action):
     """One agent step without reset; the state is donated.
+
+    Args:
+        env, params, action: as for the environment.
+        key: of all steps of the episode; each folds its time in.
+        state: before the step.
 
     Returns:
         The state, and observation, reward, terminated, truncated and what describes the
         spacecraft after the step.
     """
-    key = jax.random.key(0)  # a step without reset draws nothing
+    key = jax.random.fold_in(key, state.time)
     observation, state, reward, terminated, info = env.step_env(key, state, action, params)
     return state, (_single(observation), reward, terminated, info["truncated"], _described(info))
 

@@ -95,7 +95,7 @@ def test_time_optimal_reference_of_table_5():
 
 def test_record_keeps_every_step():
     start = EnvState(jnp.array([[0.0, 0, 0, 1]]), jnp.zeros((1, 3)), jnp.zeros(1, jnp.int32))
-    history = evaluation.record(CONTROLLER, ENV, ENV.default_params, start, 7)
+    history = evaluation.record(CONTROLLER, ENV, ENV.default_params, jax.random.key(0), start, 7)
     assert history.quaternion.shape == (7, 1, 4)
     assert history.angular_velocity.shape == history.torque.shape == (7, 1, 3)
     assert not history.torque.any()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import attjax
+from attjax import AttitudeEnv, spacecraft
 from attjax import quaternion as quaternions
-from attjax import spacecraft
 from attjax.specification import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
@@ -161,6 +161,18 @@ def test_a_share_of_none_is_none(monkeypatch):
     start = none(jax.random.key(0), spacecraft.default_params())
     assert not start.angular_velocity.any() and start.time == 0
     assert hash(none) == hash(spacecraft.NearGoalStarts(share=0.0, steps=64))  # a static argument
+
+
+def test_an_environment_says_which_episodes_are_whole():
+    """Those that start at rest, of full length; none of those that start near the goal."""
+    for steps in (64, 10_000):  # longer than an episode, too
+        starts = spacecraft.NearGoalStarts(share=0.5, steps=steps)
+        env = AttitudeEnv(frameskip=20, initial_state=starts)
+        keys = jax.random.split(jax.random.key(0), 200)
+        states = jax.vmap(env.reset, (0, None))(keys, env.default_params)[1]
+        whole = env.starts_whole(states)
+        assert whole.dtype == bool and 50 < whole.sum() < 150
+        np.testing.assert_array_equal(whole, ~states.angular_velocity.any(axis=1))
 
 
 def test_parameters_may_be_arguments_of_a_jitted_step():
