@@ -21,11 +21,11 @@ RUNS = [
 ]
 FAULTS = {
     "sign of the gyroscopic term": (
-        "dynamics.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
+        "equations.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
         "((i3 - i2) / i1, (i1 - i3) / i2, (i2 - i1) / i3)", PHYSICS,
     ),
     "gyroscopic term of a full tensor without its symmetric part": (
-        "dynamics.py", "factors = factors + factors.swapaxes(1, 2)", "factors = 2 * factors",
+        "equations.py", "factors = factors + factors.swapaxes(1, 2)", "factors = 2 * factors",
         PHYSICS,
     ),
     "missing ½ in the kinematics": (
@@ -33,19 +33,20 @@ FAULTS = {
         PHYSICS,
     ),
     "wrong order in RK4": (
-        "dynamics.py", "k3 = rate(advance(dt / 2, k2))", "k3 = rate(advance(dt / 2, k1))", PHYSICS,
+        "dynamics.py", "k3 = equations.rate(advance(dt / 2, k2))",
+        "k3 = equations.rate(advance(dt / 2, k1))", PHYSICS,
     ),
     "skipped normalisation": (
-        "dynamics.py", "return quaternions.normalize(jnp.stack(state[:4]))",
-        "return (jnp.stack(state[:4]))", PHYSICS,
+        "dynamics.py", "return quaternions.normalize(quaternion)", "return (quaternion)", PHYSICS,
     ),
     "one coasting step too many": (
-        "dynamics.py", "indices = jnp.arange(frameskip,", "indices = jnp.arange(frameskip + 1,",
+        "dynamics.py", "jnp.arange(agent_step.frameskip,", "jnp.arange(agent_step.frameskip + 1,",
         PHYSICS,
     ),
     "torque twice as strong": (
-        "dynamics.py", "change = call(_torque_step, *start, *acceleration, *gyroscopic)",
-        "change = call(_torque_step, *start, *(2 * a for a in acceleration), *gyroscopic)", PHYSICS,
+        "dynamics.py", "change = call(_first_step, start, equations)",
+        "change = call(_first_step, start, equations._replace("
+        "torque=add(equations.torque, equations.torque)))", PHYSICS,
     ),
     "terminal reward added, not replacing": (
         "reward.py", "jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",

@@ -25,6 +25,7 @@ LAYERS = [
     {"vector", "belongings", "streams"},
     {"fields", "programs", "context", "c_names", "c_text"},
     {"settings", "quaternion", "rigid_body"},
+    {"equations"},
     {"dynamics"},
     {"spacecraft", "reward", "observation"},
     {"env"},
@@ -78,7 +79,7 @@ def test_modules_import_only_earlier_layers():
 def test_learning_never_hears_of_spacecraft_and_physics_never_of_learning():
     for module in LEARNING:
         assert not imports(module) & SPACECRAFT, module
-    for module in SPACECRAFT | {"quaternion", "dynamics", "observation"}:
+    for module in SPACECRAFT | {"quaternion", "equations", "dynamics", "observation"}:
         assert not imports(module) & LEARNING, module
 
 
