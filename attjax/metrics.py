@@ -160,7 +160,7 @@ def block_row(
     sums = {name: np.asarray(x, float) for name, x in block["episodes"].items()}
     is_slowest = np.equal(frameskips, max(frameskips))
     slowest = {name: x[is_slowest] for name, x in sums.items()}
-    row = {"agent_steps": agent_steps, "wall_s": round(wall_s, 2)}
+    row: dict[str, Any] = {"agent_steps": agent_steps, "wall_s": round(wall_s, 2)}
     row |= {"episodes": int(sums["episodes"].sum())}
     row |= {m.name: _mean(sums, m.mean_of) for m in METRICS if m.mean_of and not m.is_of_slowest}
     row |= {"episode_return_n": int(slowest["episodes"].sum())}

@@ -12,6 +12,8 @@ from attjax import metrics
 from attjax.progress_status import Status
 
 WIDTHS = (25, 16, 24)
+"""Of the columns that cells have their places in, without the course that the first one draws."""
+
 GAP = "  "
 MOST_TREND, LEAST_BAR = 24, 8
 LEVELS = "▁▂▃▄▅▆▇█"

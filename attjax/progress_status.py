@@ -69,8 +69,8 @@ class Status:
         return f"{done}  {speed}/s  ETA {remaining}"
 
     def shown(self, metric: Metric) -> str:
-        """The newest value of a metric with a cell, with its unit; a dash where there is none."""
-        if metric.name not in self.known:
+        """The newest value of a metric as the panel shows it; a dash where there is none."""
+        if metric.cell is None or metric.name not in self.known:
             return "–"
         return metric.cell.form.format(self.known[metric.name])
 

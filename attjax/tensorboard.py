@@ -37,7 +37,8 @@ class EventFile:
     """
 
     def __init__(self, folder: Path, config: run_folder.Config, rows: list[dict[str, str]]) -> None:
-        self._folder, self._last = folder, None
+        self._folder = folder
+        self._last: tuple[int, float] | None = None
         seconds = float(rows[-1]["wall_s"]) if rows else 0.0
         self._start = time.time() - seconds  # as if the run had never paused
         events = [*_head(self._start, config), *(self._event(row) for row in rows)]

@@ -59,6 +59,12 @@ def test_a_metric_of_the_registry_is_on_the_panel_and_in_the_lines(two_more):
     assert line.endswith("  closest 12.5°") and "gradient" not in line
 
 
+def test_every_cell_has_a_place_of_its_own_on_the_panel():
+    places = [metric.cell.place for metric in metrics.METRICS if metric.cell]
+    assert len(set(places)) == len(places)
+    assert max(column for column, _ in places) < len(panel.WIDTHS)
+
+
 def test_a_metric_of_the_registry_is_a_curve_in_tensorboard(two_more, tmp_path):
     pytest.importorskip("tensorboardX")
     from test_tensorboard import CONFIG, compared, points

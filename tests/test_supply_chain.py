@@ -17,15 +17,7 @@ MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
 MODULES |= {"socket", "urllib", "http", "requests", "ftplib"}
 CORE = {"jax", "jaxlib", "flax", "optax", "chex", "numpy", "orbax-checkpoint", "rich"}
 IMPORTED = {name.removesuffix("-checkpoint") for name in CORE}
-FOR_EXTRAS = {
-    "canvas",
-    "plots",
-    "learning_curve",
-    "rendering",
-    "sb3",
-    "gymnax_compat",
-    "export_onnx",
-}
+FOR_EXTRAS = {"canvas", "plots", "rendering", "sb3", "gymnax_compat", "export_onnx"}
 FOR_EXTRAS |= {
     "export_stablehlo",
     "tensorboard",
