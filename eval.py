@@ -119,7 +119,7 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file):
         if plots:
             folder = arguments.plot / name if arguments.compare else arguments.plot
             flight = plots.Flight(controller, env, params, seed, flown)
-            written += plots.write_all(flight, folder, metrics if name == POLICY else [])
+            written += _write_figures(flight, folder, metrics if name == POLICY else [])
     seconds = time.monotonic() - start
     try:
         if json_file:
@@ -138,6 +138,14 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file):
     return 0
 
 
+def _write_figures(flight, folder, metrics):
+    """Of a flight, and of the training before where there are rows of its metrics."""
+    from attjax import learning_curve, plots
+
+    papers = flight.is_the_papers
+    return plots.write_all(flight, folder) + learning_curve.write(metrics, papers, folder)
+
+
 def _write_json(file, content):
     """Into a path, or a stream."""
     text = json.dumps(content, indent=2) + "\n"
@@ -150,9 +158,9 @@ def _write_json(file, content):
 
 def _metrics(folder):
     """The rows of the run's metrics.csv, for the learning curve."""
-    from attjax import metrics
+    from attjax import metrics_file
 
-    return metrics.read_rows(folder / run_folder.METRICS)
+    return metrics_file.read_rows(folder / run_folder.METRICS)
 
 
 def _prepare_plots(folder):

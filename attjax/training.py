@@ -5,7 +5,18 @@ from pathlib import Path
 
 import jax
 
-from attjax import assembly, checkpoint, cli, errors, learner, metrics, nan_search, ppo, progress
+from attjax import (
+    assembly,
+    checkpoint,
+    cli,
+    errors,
+    learner,
+    metrics,
+    metrics_file,
+    nan_search,
+    ppo,
+    progress,
+)
 from attjax.run_folder import Config
 from attjax.settings import Settings
 from attjax.signals import StopSignals
@@ -33,7 +44,7 @@ class Run:
         if checkpoint.latest(folder) is not None:
             self.learner = checkpoint.restore_learner(folder, self.learner)
         self.update = int(self.learner.update)
-        self.metrics_file = metrics.MetricsFile(folder, self.agent_steps)
+        self.metrics_file = metrics_file.MetricsFile(folder, self.agent_steps)
         self.logs = [self.metrics_file]
         self.terminal_error = None
 

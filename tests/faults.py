@@ -155,7 +155,7 @@ FAULTS = {
         "    return restored.replace(optimizer=template.optimizer, key=", RUNS,
     ),
     "rows after the checkpoint kept": (
-        "metrics.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
+        "metrics_file.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
     ),
     "no lock on the folder": (
         "run_folder.py", "fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,

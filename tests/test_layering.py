@@ -37,10 +37,10 @@ LAYERS = [
     {"rollout", "descent"},
     {"ppo"},
     {"presets", "assembly", "run_folder", "nan_search"},
-    {"help_text", "panel", "provenance", "jax_setup"},
-    {"progress", "metrics", "report", "errors", "flight_policy"},
-    {"cli", "destinations"},
-    {"checkpoint", "config_file", "tensorboard", "flight_check"},
+    {"help_text", "metrics", "provenance", "jax_setup"},
+    {"progress_status", "metrics_file", "learning_curve", "report", "errors", "flight_policy"},
+    {"cli", "destinations", "panel"},
+    {"checkpoint", "config_file", "tensorboard", "flight_check", "progress"},
     {"training", "plots", "playback", "export_c", "export_onnx", "export_stablehlo"},
 ]
 LEARNING = {"networks", "losses", "learner", "rollout", "descent", "ppo"}
