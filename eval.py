@@ -80,7 +80,7 @@ def main(argv=None) -> int:
     """Evaluate a checkpoint or a classical controller; returns the exit status."""
     arguments = parse_arguments(argv)
     advice = "fewer --episodes take less"
-    with errors.one_line_errors("eval.py", run_folder.FolderError), errors.enough_memory(advice):
+    with errors.one_line_errors("eval.py"), errors.enough_memory(advice):
         cli.select_device(arguments.device)
         names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
         trained = _trained(arguments, names)

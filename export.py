@@ -58,7 +58,7 @@ def _prefix(text):
 def main(argv=None) -> int:
     """Export a checkpoint; returns the exit status."""
     arguments = parse_arguments(argv)
-    with errors.one_line_errors("export.py", run_folder.FolderError):
+    with errors.one_line_errors("export.py"):
         cli.select_device(arguments.device)
         module = _module(FORMATS[arguments.format])
         flight = _flight_policy(arguments)

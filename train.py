@@ -70,7 +70,7 @@ def main(argv=None) -> int:
     if arguments.print_config:
         print(config_file.text(new), end="")
         return 0
-    with signals.StopSignals() as stop, errors.one_line_errors("train.py", run_folder.FolderError):
+    with signals.StopSignals() as stop, errors.one_line_errors("train.py"):
         if arguments.tensorboard:
             _check_tensorboard()
         device = cli.select_device(arguments.device)

@@ -5,13 +5,16 @@ import functools
 import signal
 import sys
 
-from attjax import help_text, streams, user_functions
+from attjax import streams
 
 OUTPUT_FAILED, BAD_INPUT = 1, 2
 
 
 class UserError(Exception):
-    """Bad input; the message is one line that names what is wrong and what is allowed."""
+    """Bad input; the message is one line that names what is wrong and what is allowed.
+
+    What users can put right is of this class, or of one derived from it, wherever it is found.
+    """
 
 
 def program(name: str):
@@ -25,7 +28,7 @@ def program(name: str):
         @functools.wraps(main)
         def command(argv=None) -> int:
             with streams.guarded():
-                help_text.print_anywhere()
+                streams.print_anywhere()
                 try:
                     status = main(argv)
                 except KeyboardInterrupt:  # training hears it itself
@@ -49,12 +52,12 @@ def program(name: str):
 
 @contextlib.contextmanager
 def one_line_errors(prog: str, *kinds: type[Exception]):
-    """Turn exceptions of these kinds, and what the system says of a file, into one line on stderr
-    and exit status 2.
+    """Turn a :class:`UserError`, exceptions of these kinds and what the system says of a file into
+    one line on stderr and exit status 2.
     """
     try:
         yield
-    except (UserError, user_functions.FunctionError, *kinds) as error:
+    except (UserError, *kinds) as error:
         fail(prog, error)
     except OSError as error:  # a folder that may not be entered, a name that is too long, ...
         if error.filename is None:

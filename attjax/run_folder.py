@@ -16,6 +16,7 @@ import uuid
 from pathlib import Path
 
 from attjax import belongings, settings, specification
+from attjax.errors import UserError
 from attjax.settings import Settings
 from attjax.specification import LM50, Spacecraft
 
@@ -29,7 +30,7 @@ CONFIG, METRICS = belongings.CONFIG, belongings.METRICS
 LOST = "lost+found"
 
 
-class FolderError(Exception):
+class FolderError(UserError):
     """A run folder cannot be used; the message is one line for the user."""
 
 

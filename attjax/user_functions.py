@@ -7,10 +7,12 @@ import sys
 import traceback
 from collections.abc import Callable
 
+from attjax.errors import UserError
+
 NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
-class FunctionError(ValueError):
+class FunctionError(UserError, ValueError):
     """A user's function cannot be used; the message is one line that names it."""
 
 

@@ -1,14 +1,17 @@
 """One-way imports, as in README.md: a module knows only those of earlier layers."""
 
 import ast
+import importlib
 import re
 import tomllib
 from pathlib import Path
 
 import attjax
+from attjax import errors
 
 LAYERS = [
-    {"values"},
+    {"values", "streams"},
+    {"errors"},
     {
         "user_functions",
         "specification",
@@ -21,7 +24,7 @@ LAYERS = [
         "canvas",
         "signals",
     },
-    {"vector", "belongings", "streams"},
+    {"vector", "belongings"},
     {"settings", "programs", "context", "c_names", "c_text"},
     {"quaternion", "rigid_body"},
     {"dynamics"},
@@ -36,7 +39,7 @@ LAYERS = [
     {"ppo"},
     {"presets", "assembly", "run_folder", "nan_search"},
     {"help_text", "panel", "provenance", "jax_setup"},
-    {"progress", "metrics", "report", "errors", "flight_policy"},
+    {"progress", "metrics", "report", "flight_policy"},
     {"cli", "destinations"},
     {"checkpoint", "config_file", "tensorboard", "flight_check"},
     {"training", "plots", "playback", "export_c", "export_onnx", "export_stablehlo"},
@@ -79,6 +82,14 @@ def test_learning_never_hears_of_spacecraft_and_physics_never_of_learning():
         assert not imports(module) & SPACECRAFT, module
     for module in SPACECRAFT | {"quaternion", "dynamics", "observation"}:
         assert not imports(module) & LEARNING, module
+
+
+def test_errors_are_the_ground_floor():
+    """What any module may raise, and how programs tell it, hangs on no module above."""
+    assert imports("errors") == {"streams"} and not imports("streams")
+    for module, kind in (("user_functions", "FunctionError"), ("run_folder", "FolderError")):
+        found = getattr(importlib.import_module(f"attjax.{module}"), kind)
+        assert issubclass(found, errors.UserError)
 
 
 def packages(module):
