@@ -14,6 +14,7 @@ LAYERS = [
     {"errors"},
     {
         "user_functions",
+        "quiet",
         "specification",
         "template",
         "checks",
