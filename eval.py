@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-from attjax import cli, config_file, destinations, errors, run_folder
+from attjax import cli, config_file, destinations, devices, errors, run_folder
 from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
 
 POLICY = "policy"
@@ -81,7 +81,7 @@ def main(argv=None) -> int:
     arguments = parse_arguments(argv)
     advice = "fewer --episodes take less"
     with errors.one_line_errors("eval.py"), errors.enough_memory(advice):
-        cli.select_device(arguments.device)
+        devices.select_device(arguments.device)
         names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
         trained = _trained(arguments, names)
         arguments.frameskip = cli.frameskip(arguments.frameskip, trained)

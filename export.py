@@ -5,7 +5,7 @@ import contextlib
 import importlib
 import sys
 
-from attjax import c_names, cli, destinations, errors, run_folder
+from attjax import c_names, cli, destinations, devices, errors, run_folder
 
 FORMATS = {"c": "export_c", "onnx": "export_onnx", "stablehlo": "export_stablehlo"}
 NEEDED = {"export_onnx": "onnx", "export_stablehlo": "flatbuffers"}
@@ -59,7 +59,7 @@ def main(argv=None) -> int:
     """Export a checkpoint; returns the exit status."""
     arguments = parse_arguments(argv)
     with errors.one_line_errors("export.py"):
-        cli.select_device(arguments.device)
+        devices.select_device(arguments.device)
         module = _module(FORMATS[arguments.format])
         flight = _flight_policy(arguments)
         names = [c_names.renamed(name, arguments.prefix) for name in module.FILES]

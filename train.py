@@ -4,7 +4,7 @@ import dataclasses
 import importlib
 import sys
 
-from attjax import cli, config_file, errors, presets, run_folder, settings, signals
+from attjax import cli, config_file, devices, errors, presets, run_folder, settings, signals
 from attjax.specification import LM50
 
 DEFAULT_PRESET = "precise"
@@ -73,7 +73,7 @@ def main(argv=None) -> int:
     with signals.StopSignals() as stop, errors.one_line_errors("train.py"):
         if arguments.tensorboard:
             _check_tensorboard()
-        device = cli.select_device(arguments.device)
+        device = devices.select_device(arguments.device)
         advice = "fewer --num-envs or a shorter --rollout-length take less"
         with run_folder.opened(arguments.checkpoint), errors.enough_memory(advice):
             run = _open(arguments, given, new, stop)

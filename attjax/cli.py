@@ -1,15 +1,13 @@
-"""What the commands share: arguments, one-line errors, paths, devices."""
+"""What the commands share: arguments, and how they are parsed. It imports no JAX."""
 
 import argparse
-import contextlib
 import dataclasses
 import functools
-import os
 import shlex
 import sys
 from pathlib import Path
 
-from attjax import errors, help_text, jax_setup, settings
+from attjax import errors, help_text, settings
 
 DEVICES = ("auto", "cpu", "gpu")
 TABLE_2 = 5
@@ -149,42 +147,3 @@ def overrides(arguments: argparse.Namespace) -> dict:
     """The settings that were given on the command line."""
     names = {field.name for field in dataclasses.fields(settings.Settings)}
     return {name: value for name, value in vars(arguments).items() if name in names}
-
-
-def select_device(name: str):
-    """The JAX device for ``--device``, made the default, of JAX as the programs need it.
-
-    On CPU each core becomes a device of its own, for training to share its work out to.
-
-    Raises:
-        errors.UserError: there is no such device, or JAX refuses a variable of the environment.
-    """
-    try:
-        import jax
-    except ValueError as error:
-        named = [x for x in os.environ if x.startswith("JAX_") and x.lower() in str(error).lower()]
-        values = jax_setup.set_variables(named)
-        raise errors.UserError(f"JAX refuses its settings: {values or error}") from None
-    if name == "cpu":
-        jax.config.update("jax_platforms", "cpu")
-        jax.config.update("jax_platform_name", "cpu")
-    with contextlib.suppress(RuntimeError):  # called where JAX runs already, as it is set up there
-        jax.config.update("jax_num_cpu_devices", available_cores())
-    jax_setup.pin_settings()
-    jax_setup.keep_compiled()
-    try:
-        device = jax.devices(None if name == "auto" else name)[0]
-    except (RuntimeError, AssertionError):  # the latter: JAX_PLATFORMS=cuda, but no such plug-in
-        found = jax_setup.set_variables(jax_setup.CHOOSING_DEVICES)
-        if not found:
-            found = f"it finds {jax.default_backend()}"
-        raise errors.UserError(f"--device is {name}, and JAX finds none; {found}") from None
-    jax.config.update("jax_default_device", device)
-    return device
-
-
-def available_cores() -> int:
-    """The cores that this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

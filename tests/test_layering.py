@@ -41,7 +41,7 @@ LAYERS = [
     {"presets", "assembly", "run_folder", "nan_search"},
     {"help_text", "panel", "provenance", "jax_setup"},
     {"progress", "metrics", "report", "flight_policy"},
-    {"cli", "destinations"},
+    {"cli", "destinations", "devices"},
     {"checkpoint", "config_file", "tensorboard", "flight_check"},
     {"training", "plots", "playback", "export_c", "export_onnx", "export_stablehlo"},
 ]
@@ -100,6 +100,16 @@ def packages(module):
             yield from (alias.name.split(".")[0] for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             yield (node.module or "").split(".")[0]
+
+
+def test_what_programs_say_before_they_work_needs_no_jax():
+    """--help, and errors in arguments: no JAX, not even late, nor a module that imports it."""
+    reached, found = {"cli"}, set()
+    while reached - found:
+        found |= reached
+        reached |= set().union(*map(imports, found))
+    for module in found:
+        assert not {"jax", "numpy", "chex", "flax"} & set(packages(module)), module
 
 
 def test_the_core_knows_no_peers():

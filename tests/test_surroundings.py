@@ -97,8 +97,8 @@ eval.main(["--json", "~/x"])
 
 
 COMPILE = """
-from attjax import cli
-cli.select_device("cpu")
+from attjax import devices
+devices.select_device("cpu")
 import jax
 jax.jit(lambda x: x + 1)(1.0)
 """
