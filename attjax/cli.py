@@ -3,9 +3,10 @@
 import argparse
 import dataclasses
 import functools
+import re
 import shlex
-import sys
 from pathlib import Path
+from typing import NoReturn
 
 from attjax import errors, help_text, settings
 
@@ -18,11 +19,33 @@ class Parser(argparse.ArgumentParser):
     """An argument parser whose errors are one line, and exit status 2."""
 
     def __init__(self, **options):
+        options = {"prog": errors.running()} | options
         super().__init__(allow_abbrev=False, formatter_class=help_text.Formatter, **options)
 
-    def error(self, message: str):
+    def error(self, message: str) -> NoReturn:
         """Print the message as one line and exit."""
-        errors.fail(self.prog, message)
+        errors.fail(message)
+
+
+def invocation(command: str) -> str:
+    """How to start a program, as the one that runs was started.
+
+    Example:
+        >>> invocation("eval")
+        'attjax eval'
+    """
+    is_file = errors.running().endswith(".py")
+    return f"python {command}.py" if is_file else f"attjax {command}"
+
+
+def examples(text: str) -> str:
+    """The examples of a program's help, started as the one that runs was.
+
+    Example:
+        >>> examples("python train.py --resume")
+        'attjax train --resume'
+    """
+    return re.sub(r"python (\w+)\.py", lambda found: invocation(found[1]), text)
 
 
 def quoted(path: Path) -> str:
@@ -84,14 +107,11 @@ def frameskip(given: int | None, trained: tuple[int, ...] | None) -> int:
     return min(trained or [TABLE_2], key=lambda k: (abs(k - TABLE_2), k))
 
 
-def warn_of_untrained(prog: str, frameskip: int, trained: tuple[int, ...] | None) -> None:
+def warn_of_untrained(frameskip: int, trained: tuple[int, ...] | None) -> None:
     """Print a line on stderr for a frameskip that the policy was not trained at."""
     if trained and frameskip not in trained:
         rates = ", ".join(map(str, sorted(set(trained))))
-        print(
-            f"{prog}: warning: frameskip {frameskip} was not trained; the run trained {rates}",
-            file=sys.stderr,
-        )
+        errors.warning_line(f"frameskip {frameskip} was not trained; the run trained {rates}")
 
 
 def add_number(group, name: str, kind: type, default, help: str, **details) -> None:

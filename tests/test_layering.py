@@ -44,6 +44,7 @@ LAYERS = [
     {"cli", "destinations", "devices"},
     {"checkpoint", "config_file", "tensorboard", "flight_check"},
     {"training", "plots", "playback", "export_c", "export_onnx", "export_stablehlo"},
+    {"commands"},
 ]
 LEARNING = {"networks", "losses", "learner", "rollout", "descent", "ppo"}
 SPACECRAFT = {"spacecraft", "reward", "env"}
@@ -52,21 +53,29 @@ FOR_PEERS = {"gymnasium_env", "gymnasium_vector", "gymnasium_task", "gymnax_comp
 FOLDER = Path(attjax.__file__).parent
 
 
+def nodes(module):
+    """Of a module, or of all in a folder of them."""
+    folder = FOLDER / module
+    for path in folder.glob("*.py") if folder.is_dir() else [FOLDER / f"{module}.py"]:
+        yield from ast.walk(ast.parse(path.read_text()))
+
+
 def imports(module):
     """The attjax modules that a module imports, at its top or inside functions."""
     found = set()
-    for node in ast.walk(ast.parse((FOLDER / f"{module}.py").read_text())):
+    for node in nodes(module):
         if isinstance(node, ast.ImportFrom) and node.module == "attjax":
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("attjax."):
             found.add(node.module.split(".")[1])
         elif isinstance(node, ast.Import):
             found |= {a.name.split(".")[1] for a in node.names if a.name.startswith("attjax.")}
-    return found
+    return found - {module}
 
 
 def test_every_module_has_its_layer():
-    modules = {path.stem for path in FOLDER.glob("*.py")} - {"__init__"}
+    modules = {path.stem for path in FOLDER.glob("*.py")} - {"__init__", "__main__"}
+    modules |= {path.parent.name for path in FOLDER.glob("*/__init__.py")}
     assert modules == set().union(*LAYERS)
 
 
@@ -95,7 +104,7 @@ def test_errors_are_the_ground_floor():
 
 def packages(module):
     """The packages that a module imports."""
-    for node in ast.walk(ast.parse((FOLDER / f"{module}.py").read_text())):
+    for node in nodes(module):
         if isinstance(node, ast.Import):
             yield from (alias.name.split(".")[0] for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
