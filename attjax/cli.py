@@ -6,10 +6,12 @@ import functools
 import re
 import shlex
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from attjax import errors, help_text, settings
 
+Group = argparse._ActionsContainer
+"""A parser, or a group of its flags."""
 DEVICES = ("auto", "cpu", "gpu")
 TABLE_2 = 5
 """Frameskip of the paper's Table 2, 40 Hz."""
@@ -18,7 +20,7 @@ TABLE_2 = 5
 class Parser(argparse.ArgumentParser):
     """An argument parser whose errors are one line, and exit status 2."""
 
-    def __init__(self, **options):
+    def __init__(self, **options: Any):
         options = {"prog": errors.running()} | options
         super().__init__(allow_abbrev=False, formatter_class=help_text.Formatter, **options)
 
@@ -63,7 +65,7 @@ def path(text: str) -> Path:
         raise argparse.ArgumentTypeError(f"there is no home for {text!r}; write it out") from None
 
 
-def add_checkpoint(group) -> None:
+def add_checkpoint(group: Group) -> None:
     """Add --checkpoint."""
     folder_help = "folder of the training run (default: ckpt)"
     group.add_argument(
@@ -71,20 +73,20 @@ def add_checkpoint(group) -> None:
     )
 
 
-def add_best(group) -> None:
+def add_best(group: Group) -> None:
     """Add --best, which belongs beside --checkpoint."""
     best_help = "the checkpoint with the least terminal error in training, not the newest"
     group.add_argument("--best", action="store_true", help=best_help)
 
 
-def add_seed_and_device(group, seed_help: str) -> None:
+def add_seed_and_device(group: Group, seed_help: str) -> None:
     """Add --seed and --device."""
     add_number(group, "seed", int, None, f"{seed_help} (default: 0)", **settings.SEED)
     device_help = "where to compute (default: auto, a GPU if JAX finds one)"
     group.add_argument("--device", choices=DEVICES, default="auto", help=device_help)
 
 
-def add_frameskip(group, meaning: str) -> None:
+def add_frameskip(group: Group, meaning: str) -> None:
     """Add --frameskip, None where it is not given: :func:`frameskip` then chooses."""
     default = f"{TABLE_2} as in Table 2 if that was trained, else the trained one nearest to it"
     help = f"{meaning} (default: {default})"
@@ -114,7 +116,9 @@ def warn_of_untrained(frameskip: int, trained: tuple[int, ...] | None) -> None:
         errors.warning_line(f"frameskip {frameskip} was not trained; the run trained {rates}")
 
 
-def add_number(group, name: str, kind: type, default, help: str, **details) -> None:
+def add_number(
+    group: Group, name: str, kind: type, default: float | None, help: str, **details: Any
+) -> None:
     """Add the flag of a number with details as in :func:`attjax.settings.setting`."""
     field = settings.single(name, kind, help, **details)
     help = help_text.meaning(field)
@@ -127,7 +131,7 @@ def add_number(group, name: str, kind: type, default, help: str, **details) -> N
     )
 
 
-def add_settings(group, name: str) -> None:
+def add_settings(group: Group, name: str) -> None:
     """Add a flag for every setting of a group; those not given are left out of the namespace."""
     for field in dataclasses.fields(settings.Settings):
         if field.metadata["group"] != name:
@@ -163,7 +167,7 @@ def _parse(field, text):
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def overrides(arguments: argparse.Namespace) -> dict:
+def overrides(arguments: argparse.Namespace) -> dict[str, Any]:
     """The settings that were given on the command line."""
     names = {field.name for field in dataclasses.fields(settings.Settings)}
     return {name: value for name, value in vars(arguments).items() if name in names}

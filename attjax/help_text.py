@@ -13,7 +13,7 @@ MOST_COLUMNS = 100
 class Formatter(argparse.RawDescriptionHelpFormatter):
     """Of the terminal's width, up to 100 columns; ``--[no-]flag`` in place of two flags."""
 
-    def __init__(self, prog):
+    def __init__(self, prog: str):
         columns = min(shutil.get_terminal_size().columns, MOST_COLUMNS)
         super().__init__(prog, max_help_position=30, width=columns - 1)
 
@@ -53,7 +53,7 @@ def defaults(name: str) -> str:
     return "; ".join(f"{', '.join(names)}: {value}" for value, names in presets_of.items())
 
 
-def show(value) -> str:
+def show(value: tuple[int, ...] | bool | float | str) -> str:
     """A value as its flag takes it; yes or no for a switch.
 
     Example:

@@ -10,6 +10,7 @@ import errno
 import io
 import os
 import sys
+from collections.abc import Iterator
 
 ERRORS = "attjax.plain"
 """The name of our error handler among the codecs'."""
@@ -30,7 +31,7 @@ class Output(io.FileIO):
 
     failure: OSError | None = None
 
-    def write(self, data) -> int:
+    def write(self, data: bytes | memoryview) -> int:
         """Write, or drop what is to be written."""
         if self.failure is None:
             try:
@@ -41,7 +42,7 @@ class Output(io.FileIO):
 
 
 @contextlib.contextmanager
-def guarded():
+def guarded() -> Iterator[None]:
     """Let nothing that is printed to Python's own stdout and stderr raise, within the context.
 
     Streams that someone put in their place, as a notebook does, are left as they are.

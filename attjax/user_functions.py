@@ -16,7 +16,7 @@ class FunctionError(UserError, ValueError):
     """A user's function cannot be used; the message is one line that names it."""
 
 
-def is_name(x) -> bool:
+def is_name(x: object) -> bool:
     """Whether x has the form ``package.module:function``."""
     return isinstance(x, str) and NAME.fullmatch(x) is not None
 
