@@ -7,7 +7,7 @@ import textwrap
 import tomllib
 from pathlib import Path
 
-from attjax import fields, help_text, presets, settings, specification
+from attjax import fields, help_text, presets, settings, specification, streams
 from attjax.errors import UserError
 from attjax.run_folder import Config
 from attjax.specification import Spacecraft
@@ -86,7 +86,7 @@ def text(config: Config) -> str:
 
 def _comment(field):
     described = "; ".join(filter(None, (help_text.meaning(field), fields.limits(field))))
-    described = help_text.plain(described)
+    described = streams.plain(described)
     return textwrap.wrap(described, 100, initial_indent="# ", subsequent_indent="# ")
 
 

@@ -11,11 +11,11 @@ import json
 import operator
 import os
 import re
-import sys
 import uuid
 from pathlib import Path
 
 from attjax import belongings, settings, specification
+from attjax.errors import UserError, warning_line
 from attjax.settings import Settings
 from attjax.specification import LM50, Spacecraft
 
@@ -29,7 +29,7 @@ CONFIG, METRICS = belongings.CONFIG, belongings.METRICS
 LOST = "lost+found"
 
 
-class FolderError(Exception):
+class FolderError(UserError):
     """A run folder cannot be used; the message is one line for the user."""
 
 
@@ -106,7 +106,7 @@ def _lock(folder):
             ) from None
         except OSError as error:
             reason = f"is not protected from a second train.py: {error.strerror or error}"
-            print(f"train.py: warning: {folder} {reason}", file=sys.stderr)
+            warning_line(f"{folder} {reason}")
             return lock
         # Who held it may have ended, and removed the file, since it was opened here.
         with contextlib.suppress(FileNotFoundError):

@@ -107,14 +107,14 @@ class Run:
             with progress.Progress(total, self.agent_steps, rows, self.stop) as view:
                 diverged = self._loop(train_block, saver, view, save_every_s)
             if diverged:
-                errors.error_line("train.py", diverged)
+                errors.error_line(diverged)
                 return DIVERGED
             saver.save(self.learner, self.terminal_error)
         if self.stop.received is not None:
             print(f"stopped and saved at {self.agent_steps:,} agent steps; continue with --resume")
             return 128 + self.stop.received
         folder = cli.quoted(self.folder)
-        print(f"trained; evaluate with: python eval.py --checkpoint {folder}")
+        print(f"trained; evaluate with: {cli.invocation('eval')} --checkpoint {folder}")
         return 0
 
     def _compiled(self, debug_nans):

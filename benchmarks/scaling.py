@@ -29,7 +29,7 @@ MEMORY_NOTE = "Peak memory is the whole process's, with Python, JAX and the comp
 
 def parse_arguments(argv):
     """The command line; --child is for the processes that this script starts."""
-    parser = common.parser("scaling.py", __doc__)
+    parser = common.parser(__doc__)
     common.add_num_envs(parser, NUM_ENVS)
     cli.add_number(parser, "repeats", int, 7, "measurements of each figure", low=1)
     cli.add_number(parser, "cores", int, 2, "compare one core and that many", low=1)
@@ -45,13 +45,14 @@ def parse_arguments(argv):
     return parser.parse_args(argv)
 
 
+@errors.program("scaling.py")
 def main(argv=None) -> int:
     """Run the benchmark; returns the exit status."""
     arguments = parse_arguments(argv)
     if arguments.child is not None:
         print(json.dumps(child(**arguments.child)))
         return 0
-    with errors.one_line_errors("scaling.py"):
+    with errors.one_line_errors():
         check(arguments)
     machine = common.machine()
     common.print_machine(machine)

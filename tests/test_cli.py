@@ -223,13 +223,13 @@ def test_a_signal_before_the_first_block_saves_the_start(tmp_path, number):
     code = f"""
 import os, sys
 sys.path.insert(0, {str(ROOT)!r})
-from attjax import cli
+from attjax import devices
 import train
-select = cli.select_device
+select = devices.select_device
 def select_device(name):
     os.kill(os.getpid(), {int(number)})
     return select(name)
-cli.select_device = select_device
+devices.select_device = select_device
 sys.exit(train.main(sys.argv[1:]))
 """
     folder = tmp_path / "run"

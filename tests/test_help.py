@@ -9,7 +9,7 @@ import time
 import pytest
 from commands import ROOT, TINY, eval_script, export_script, run, train_script
 
-from attjax import config_file, fields, help_text, presets, run_folder, settings
+from attjax import config_file, fields, help_text, presets, run_folder, settings, streams
 
 SCRIPTS = {"train.py": train_script, "eval.py": eval_script, "export.py": export_script}
 FIELDS = settings.FIELDS.values()
@@ -125,7 +125,7 @@ def test_a_printed_file_is_ascii_and_explains_every_setting():
             assert lines[i - 1].startswith("# ") and not lines[i - 1].startswith("# ---")
     flat = text.replace("\n# ", " ")
     for field in FIELDS:
-        assert help_text.plain(help_text.meaning(field)) in flat
+        assert streams.plain(help_text.meaning(field)) in flat
         assert fields.limits(field) in flat
     for title in fields.GROUPS.values():
         assert f"# --- {title} ---" in lines
