@@ -213,13 +213,14 @@ def step(
     params = default_params(frameskip) if params is None else params
     check_params(params, frameskip)
     action = checks.integer("action", action, 0, len(params.torque_table) - 1)
-    quaternion, angular_velocity = dynamics.propagate(
-        checks.unit_quaternion("quaternion", state.quaternion),
-        state.angular_velocity,
-        applied_torque(action, params),
-        params.inertia,
-        frameskip,
-        params.frameskip,
-        params.torque_held,
-    )
-    return EnvState(quaternion, angular_velocity, state.time + 1)
+    quaternion = checks.unit_quaternion("quaternion", state.quaternion)
+    angular_velocity = checks.real("angular_velocity", state.angular_velocity, (3,))
+    moving = quaternion, angular_velocity, applied_torque(action, params), params.inertia
+    have_values = all(map(checks.has_value, jax.tree.leaves((moving, params.frameskip))))
+    propagate = _compiled_propagate if have_values else dynamics.propagate
+    moved = propagate(*moving, frameskip, params.frameskip, params.torque_held)
+    return EnvState(*moved, state.time + 1)
+
+
+_compiled_propagate = jax.jit(dynamics.propagate, static_argnames=("frameskip", "held"))
+"""For steps outside ``jit`` and ``vmap``, each of which would compile its loops anew."""
