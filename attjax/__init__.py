@@ -1,15 +1,52 @@
 """Neural spacecraft attitude control: vectorised simulator and PPO in JAX."""
 
 import importlib
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["AttitudeEnv", "EnvParams", "EnvState", "Spacecraft", "step"]
+if TYPE_CHECKING:
+    from attjax.checkpoint import load_policy
+    from attjax.env import AttitudeEnv
+    from attjax.evaluation import evaluate
+    from attjax.spacecraft import EnvParams, EnvState, step
+    from attjax.specification import LM50, Spacecraft
+    from attjax.training import train
+    from attjax.vector import open_loop
+
+__all__ = [
+    "LM50",
+    "AttitudeEnv",
+    "EnvParams",
+    "EnvState",
+    "Spacecraft",
+    "evaluate",
+    "load_policy",
+    "open_loop",
+    "step",
+    "train",
+]
 __version__ = "0.1.0"
 
-_MODULES = {"AttitudeEnv": "env", "Spacecraft": "specification"}
+_MODULES = {
+    "AttitudeEnv": "env",
+    "EnvParams": "spacecraft",
+    "EnvState": "spacecraft",
+    "LM50": "specification",
+    "Spacecraft": "specification",
+    "evaluate": "evaluation",
+    "load_policy": "checkpoint",
+    "open_loop": "vector",
+    "step": "spacecraft",
+    "train": "training",
+}
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> Any:
     """Import at first use: JAX takes seconds, which ``train.py --help`` need not."""
-    if name not in __all__:
+    if name not in _MODULES:
         raise AttributeError(f"module 'attjax' has no attribute {name!r}")
-    return getattr(importlib.import_module("attjax." + _MODULES.get(name, "spacecraft")), name)
+    return getattr(importlib.import_module(f"attjax.{_MODULES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """The public names, too."""
+    return sorted({*globals(), *__all__})

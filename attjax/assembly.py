@@ -9,8 +9,10 @@ import numpy as np
 
 from attjax import learner, observation, spacecraft, user_functions
 from attjax.env import AttitudeEnv
+from attjax.errors import UserValueError
 from attjax.networks import FEATURES, Policy, rate_mask
 from attjax.reward import REWARDS
+from attjax.run_config import Config
 from attjax.settings import Settings
 from attjax.specification import LM50, Spacecraft
 
@@ -42,7 +44,7 @@ def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) ->
 
     Raises:
         FunctionError: the reward or the features are a user's function that cannot be used.
-        ValueError: the rate mask leaves no torque, even at rest.
+        UserValueError: the rate mask leaves no torque, even at rest.
     """
     reward = REWARDS.get(settings.task.reward) or user_functions.resolve(settings.task.reward)
     start = spacecraft.initial_state
@@ -62,13 +64,22 @@ def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) ->
     return learner.Setup(env, policy(settings, craft), settings, groups, num_devices)
 
 
+def of_config(config: Config) -> learner.Setup:
+    """The same of a run's configuration, on as many devices as it is worth.
+
+    Raises:
+        FunctionError, UserValueError: as :func:`setup`.
+    """
+    return setup(config.settings, config.spacecraft, num_devices(config.settings))
+
+
 def _check_that_torques_are_left(settings, craft):
     for frameskip in settings.task.frameskips:
         env = AttitudeEnv(frameskip, spacecraft=craft)
         at_rest = jnp.zeros(observation.SIZE)
         context = env.context(env.default_params)
         if np.sum(rate_mask(at_rest, context, settings.network.rate_margin)) <= 1:
-            raise ValueError(
+            raise UserValueError(
                 f"rate_margin {settings.network.rate_margin:g} masks every torque of {craft} with "
                 f"frameskip {frameskip}, even at rest; weaker torque_levels, smaller frameskips or "
                 f"a larger rate_limit leave some, and rate_margin 0 masks nothing"

@@ -181,6 +181,27 @@ def restore_learner(folder: Path, template: Learner) -> Learner:
     return restored.replace(key=jax.random.wrap_key_data(restored.key, impl=implementation))
 
 
+def load_policy(folder: str | Path, *, use_best: bool = False) -> jax.tree_util.Partial:
+    """The policy of a training run, as ``act(observation, context) -> action``: greedy, pure JAX.
+
+    Args:
+        folder: of the run, as ``train.py --checkpoint``.
+        use_best: take the checkpoint with the least error in training, not the newest.
+
+    Raises:
+        FolderError: the folder holds no checkpoint, or an unreadable one.
+
+    Example:
+        >>> from attjax import AttitudeEnv, load_policy
+        >>> act, env = load_policy("pretrained/precise"), AttitudeEnv(frameskip=5)
+        >>> observation, _ = env.reset(jax.random.key(0))
+        >>> int(act(observation, env.context(env.default_params))) in range(env.num_actions)
+        True
+    """
+    folder = Path(folder)
+    return restore_policy(folder, best(folder) if use_best else None)
+
+
 def restore_policy(folder: Path, update: int | None = None) -> jax.tree_util.Partial:
     """A saved policy, the newest by default, as ``act(observation, context) -> action``.
 

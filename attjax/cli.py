@@ -7,13 +7,11 @@ import shlex
 from pathlib import Path
 from typing import Any, NoReturn
 
-from attjax import errors, fields, help_text, settings
+from attjax import errors, fields, help_text, run_config, settings
 
 Group = argparse._ActionsContainer
 """A parser, or a group of its flags."""
 DEVICES = ("auto", "cpu", "gpu")
-TABLE_2 = 5
-"""Frameskip of the paper's Table 2, 40 Hz."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -86,26 +84,11 @@ def add_seed_and_device(group: Group, seed_help: str) -> None:
 
 
 def add_frameskip(group: Group, meaning: str) -> None:
-    """Add --frameskip, None where it is not given: :func:`frameskip` then chooses."""
-    default = f"{TABLE_2} as in Table 2 if that was trained, else the trained one nearest to it"
+    """Add --frameskip, None where it is not given: one that suits the policy is chosen then."""
+    table_2 = run_config.TABLE_2
+    default = f"{table_2} as in Table 2 if that was trained, else the trained one nearest to it"
     help = f"{meaning} (default: {default})"
     add_number(group, "frameskip", int, None, help, **fields.FRAMESKIP)
-
-
-def frameskip(given: int | None, trained: tuple[int, ...] | None) -> int:
-    """The frameskip that was asked for, or else one that suits the controller.
-
-    Args:
-        given: what the user asked for, if anything.
-        trained: those that the policy was trained at; None of a controller without training.
-
-    Example:
-        >>> frameskip(None, (7, 3, 20))  # the quicker of two as near
-        3
-    """
-    if given is not None:
-        return given
-    return min(trained or [TABLE_2], key=lambda k: (abs(k - TABLE_2), k))
 
 
 def warn_of_untrained(frameskip: int, trained: tuple[int, ...] | None) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from attjax import fields, help_text, presets, settings, specification, streams
 from attjax.errors import UserError
-from attjax.run_folder import Config
+from attjax.run_config import Config
 from attjax.specification import Spacecraft
 
 SETTINGS = settings.FIELDS

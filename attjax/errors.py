@@ -22,6 +22,10 @@ class UserError(Exception):
     """
 
 
+class UserValueError(UserError, ValueError):
+    """A value that users can put right, and that a library's user expects as a ValueError."""
+
+
 _running = contextvars.ContextVar("_running", default="attjax")
 
 

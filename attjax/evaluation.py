@@ -168,6 +168,39 @@ def record(
     return jax.lax.scan(step, (observation, start), jnp.arange(steps))[1]
 
 
+def evaluate(
+    controller: Controller,
+    env: AttitudeEnv | None = None,
+    *,
+    episodes: int = 5000,
+    seed: int = 0,
+) -> dict:
+    """Judge a controller over random slews, as ``eval.py`` does.
+
+    Args:
+        controller: ``act(observation, context) -> action``: a policy of ``attjax.load_policy``
+            or of ``attjax.train(...)``, a classical law, any function of one's own.
+        env: what flies, and its control rate; by default LM50 at 40 Hz, as in Table 2.
+        episodes: number of slews.
+        seed: of their starts.
+
+    Returns:
+        The conditions and the statistics, as ``eval.py --json`` writes them.
+
+    Raises:
+        ValueError: there are no episodes.
+
+    Example:
+        >>> from attjax.controllers import phase_plane
+        >>> evaluate(phase_plane, AttitudeEnv(frameskip=20), episodes=10)["success_rate"]
+        1.0
+    """
+    env = AttitudeEnv(frameskip=5) if env is None else env
+    params, key = env.default_params, jax.random.key(seed)
+    flown = fly(jax.tree_util.Partial(controller), env, params, key, episodes)
+    return conditions(env, params, seed, episodes) | statistics(flown, env, params)
+
+
 def conditions(env: AttitudeEnv, params: EnvParams, seed: int, episodes: int) -> dict:
     """What the episodes of :func:`fly` have in common, for ``eval.py --json``."""
     return {

@@ -47,7 +47,7 @@ def defaults(name: str) -> str:
     """
     presets_of = {}
     for preset, values in presets.PRESETS.items():
-        presets_of.setdefault(show(getattr(values, name)), []).append(preset)
+        presets_of.setdefault(show(values.flat[name]), []).append(preset)
     if len(presets_of) == 1:
         return f"default: {next(iter(presets_of))}"
     return "; ".join(f"{', '.join(names)}: {value}" for value, names in presets_of.items())

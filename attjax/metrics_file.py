@@ -5,6 +5,8 @@ import io
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from attjax import metrics, run_folder
 
 NEEDED = {"agent_steps", "wall_s"}
@@ -71,6 +73,23 @@ def read_rows(path: Path) -> list[dict[str, str]]:
 def cells(row: dict[str, Any]) -> dict[str, Any]:
     """The row as it stands in the file: floats as text of seven digits."""
     return {name: f"{x:.7g}" if isinstance(x, float) else x for name, x in row.items()}
+
+
+def arrays(rows: list[dict[str, Any]]) -> dict[str, np.ndarray]:
+    """The columns of rows as arrays, float64, NaN where a cell is empty.
+
+    Example:
+        >>> arrays([{"agent_steps": 64, "entropy": "2.5"}, {"agent_steps": 128}])["entropy"]
+        array([2.5, nan])
+    """
+    return {
+        name: np.array([_number(row.get(name)) for row in rows], float)
+        for name in metrics.columns()
+    }
+
+
+def _number(cell):
+    return float("nan") if cell in (None, "") else float(cell)
 
 
 def _csv_text(rows, header=False):

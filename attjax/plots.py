@@ -28,13 +28,13 @@ def _angles_deg(quaternion):
 
 @dataclasses.dataclass(frozen=True)
 class Flight:
-    """A controller, the conditions it flew under, and the outcome of its episodes."""
+    """A controller, and the slews that it flies: those of :func:`attjax.evaluate`."""
 
     controller: Controller
     env: AttitudeEnv
     params: EnvParams
     seed: int
-    flown: Episodes
+    episodes: int
 
     @property
     def hz(self) -> str:
@@ -54,8 +54,14 @@ class Flight:
     @property
     def starts(self) -> EnvState:
         """The initial states of the flown slews."""
-        key, episodes = jax.random.key(self.seed), len(self.flown.overspeed)
-        return evaluation.random_slews(self.env, self.params, key, episodes)[1]
+        key = jax.random.key(self.seed)
+        return evaluation.random_slews(self.env, self.params, key, self.episodes)[1]
+
+    @functools.cached_property
+    def flown(self) -> Episodes:
+        """The outcome of its episodes."""
+        key = jax.random.key(self.seed)
+        return evaluation.fly(self.controller, self.env, self.params, key, self.episodes)
 
     @functools.cached_property
     def table_5(self):

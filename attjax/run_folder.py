@@ -8,7 +8,6 @@ folder that ``--resume`` goes on from: files are replaced in one step, never edi
 import contextlib
 import dataclasses
 import json
-import operator
 import os
 import re
 import uuid
@@ -16,8 +15,7 @@ from pathlib import Path
 
 from attjax import belongings, settings, specification
 from attjax.errors import UserError, warning_line
-from attjax.settings import Settings
-from attjax.specification import LM50, Spacecraft
+from attjax.run_config import Config
 
 try:
     import fcntl
@@ -31,29 +29,6 @@ LOST = "lost+found"
 
 class FolderError(UserError):
     """A run folder cannot be used; the message is one line for the user."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Config:
-    """What a run was started with.
-
-    Raises:
-        ValueError: an agent step takes longer than the spacecraft's episode.
-    """
-
-    preset: str
-    seed: int
-    settings: Settings
-    spacecraft: Spacecraft = LM50
-
-    def __post_init__(self):
-        object.__setattr__(self, "seed", operator.index(self.seed))
-        longest = max(self.settings.task.frameskips)
-        if self.spacecraft.max_steps(longest) < 1:
-            raise ValueError(
-                f"frameskips holds {longest}; in {self.spacecraft.duration} s, the duration of an "
-                f"episode, it must be at most {self.spacecraft.max_steps(0) - 1}"
-            )
 
 
 @contextlib.contextmanager

@@ -17,7 +17,7 @@ from tensorboardX.proto.summary_pb2 import Summary
 from tensorboardX.record_writer import masked_crc32c
 from tensorboardX.summary import hparams
 
-from attjax import belongings, metrics, metrics_file, run_folder
+from attjax import belongings, metrics, metrics_file, run_config, run_folder
 
 RATE = "time/steps_per_s"
 """Agent steps a second between two rows."""
@@ -35,7 +35,7 @@ class EventFile:
         FolderError: it cannot be written.
     """
 
-    def __init__(self, folder: Path, config: run_folder.Config, rows: list[dict[str, str]]) -> None:
+    def __init__(self, folder: Path, config: run_config.Config, rows: list[dict[str, str]]) -> None:
         self._folder = folder
         self._last: tuple[int, float] | None = None
         seconds = float(rows[-1]["wall_s"]) if rows else 0.0

@@ -1,165 +1,126 @@
-"""A training run: blocks of updates, and between them metrics, checkpoints and signals."""
+"""Training from Python or from the command line: ``attjax.train``."""
 
+import contextlib
 import time
+from collections.abc import Callable
 from pathlib import Path
 
-import jax
-
-from attjax import (
-    assembly,
-    checkpoint,
-    cli,
-    errors,
-    learner,
-    metrics,
-    metrics_file,
-    nan_search,
-    ppo,
-    progress,
-)
-from attjax.run_folder import Config
+from attjax import assembly, run_config, run_folder
+from attjax.keeper import Keeper, Place
+from attjax.run import Diverged, Run
 from attjax.settings import Settings
-from attjax.signals import StopSignals
-
-DIVERGED = 3
+from attjax.specification import Spacecraft
 
 
-class Run:
-    """A training run in its folder, at its start or at its newest checkpoint.
+class Observer:
+    """Hears of a run while it trains; a subclass says what it does with that.
 
-    Args:
-        folder: where its checkpoints and metrics are; open.
-        config: what it was started with.
-        setup: made of it.
-        stop: says when to end after a block.
-
-    Raises:
-        FolderError: the folder's checkpoint or metrics cannot be read.
+    A run that is done, has been asked to stop or has failed ends with :meth:`ended`.
     """
 
-    def __init__(self, folder: Path, config: Config, setup: learner.Setup, stop: StopSignals):
-        self.folder, self.config, self.settings, self.stop = folder, config, config.settings, stop
-        self.setup, self.env_params = setup, assembly.env_params(setup)
-        self.learner = learner.init(self.setup, self.env_params, jax.random.key(config.seed))
-        if checkpoint.latest(folder) is not None:
-            self.learner = checkpoint.restore_learner(folder, self.learner)
-        self.update = int(self.learner.update)
-        self.metrics_file = metrics_file.MetricsFile(folder, self.agent_steps)
-        self.logs = [self.metrics_file]
-        self.terminal_error = None
+    def started(self, run: Run, lengthened_from: Settings | None) -> None:
+        """It is at its start, or where it goes on; with the settings that had a smaller total."""
 
-    @property
-    def agent_steps(self) -> int:
-        """Agent steps done."""
-        return self.update * self.settings.ppo.steps_per_update
+    def compiled(self, run: Run, seconds: float | None) -> None:
+        """Its program is compiled; None: there was nothing left to compile for."""
 
-    @property
-    def goes_on(self) -> bool:
-        """Whether there is another block to run."""
-        return self.update < self.settings.ppo.num_updates and self.stop.received is None
+    def block(self, row: dict) -> None:
+        """A block of updates is done, with this row of metrics."""
 
-    def describe(self, device) -> None:
-        """Print what the run is, and where it stands."""
-        settings = self.settings
-        craft = self.config.spacecraft
-        print(
-            f"preset {self.config.preset}, {craft.name}, seed {self.config.seed}, "
-            f"{settings.ppo.num_updates * settings.ppo.steps_per_update:,} agent steps "
-            f"({settings.ppo.num_updates:,} updates of {settings.ppo.steps_per_update:,}) on "
-            f"{self.setup.num_devices} x {device.device_kind} ({device.platform}), in {self.folder}"
-        )
-        if self.update:
-            print(f"resumed at {self.agent_steps:,} agent steps")
+    def wants_to_stop(self) -> bool:
+        """Whether the run is to end where it can go on."""
+        return False
 
-    def write_events(self) -> None:
-        """Write TensorBoard's event file, too.
+    def ended(self) -> None:
+        """No block follows."""
 
-        Raises:
-            ImportError: tensorboardX is not installed.
-            FolderError: it cannot be written.
-        """
-        from attjax import tensorboard
 
-        self.logs.append(tensorboard.EventFile(self.folder, self.config, self.metrics_file.kept))
+class _Callback(Observer):
+    """A function of a row of metrics, which returns True for the run to stop."""
 
-    def announce_longer(self, before: Settings) -> None:
-        """Print what a larger total than ``before``'s changes from here on."""
-        old, new = before.ppo, self.settings.ppo
-        steps = self.update * new.passes * new.minibatches
-        slow, fast = (learner.learning_rate(ppo, steps) for ppo in (old, new))
-        print(
-            f"total steps raised from {old.total_steps:,} to {new.total_steps:,}: "
-            f"at {self.agent_steps:,} the learning rate goes from {slow:.3g} to {fast:.3g}, "
-            f"and from there to {new.final_learning_rate:.3g} at the new end; the entropy bonus "
-            f"likewise"
-        )
+    def __init__(self, function):
+        self._function, self._stops = function, False
 
-    def train(self, save_every_s: float, debug_nans: bool = False) -> int:
-        """Train to the end, or to a signal; returns the exit status.
+    def block(self, row):
+        self._stops = bool(self._function(row))
 
-        Raises:
-            FolderError: the folder cannot be written. Its checkpoints are as they were.
-        """
-        train_block = self._compiled(debug_nans) if self.goes_on else None
-        total = self.settings.ppo.num_updates * self.settings.ppo.steps_per_update
-        rows = self.metrics_file.kept
-        with checkpoint.Saver(self.folder) as saver:
-            with progress.Progress(total, self.agent_steps, rows, self.stop) as view:
-                diverged = self._loop(train_block, saver, view, save_every_s)
-            if diverged:
-                errors.error_line(diverged)
-                return DIVERGED
-            saver.save(self.learner, self.terminal_error)
-        if self.stop.received is not None:
-            print(f"stopped and saved at {self.agent_steps:,} agent steps; continue with --resume")
-            return 128 + self.stop.received
-        folder = cli.quoted(self.folder)
-        print(f"trained; evaluate with: {cli.invocation('eval')} --checkpoint {folder}")
-        return 0
+    def wants_to_stop(self):
+        return self._stops
 
-    def _compiled(self, debug_nans):
-        start = time.monotonic()
-        arguments = self.setup, self.env_params, self.learner
-        if debug_nans:
-            train_block = nan_search.train_block(*arguments)
-        else:
-            train_block = ppo.train_block.lower(*arguments, 1).compile()
-        print(f"compiled in {time.monotonic() - start:.1f} s", flush=True)
-        return train_block
 
-    def _loop(self, train_block, saver, view, save_every_s):
-        """Run blocks until the end or a signal; returns what diverged, if anything."""
-        start, saved = time.monotonic() - self.metrics_file.wall_s, time.monotonic()
-        while self.goes_on:
-            count = min(
-                self.settings.logging.updates_per_block, self.settings.ppo.num_updates - self.update
-            )
+def train(
+    preset: str | Settings | None = None,
+    *,
+    seed: int | None = None,
+    spacecraft: Spacecraft | None = None,
+    folder: str | Path | Place | None = None,
+    callback: Callable[[dict], bool | None] | Observer | None = None,
+    debug_nans: bool = False,
+    **settings,
+) -> Run:
+    """Train a policy by PPO.
+
+    Args:
+        preset: the recipe, by name, or settings of one's own; by default "precise", or what the
+            folder's run was started with.
+        seed: of everything random; 0 by default.
+        spacecraft: what flies, and its task; LM50, the paper's, by default.
+        folder: to keep the run in, as ``train.py --checkpoint`` does; a :class:`Place` says how,
+            and whether to go on with the run that it holds. None: nothing is written.
+        callback: called with each block's row of metrics; where it returns True, the run ends
+            there. An :class:`Observer` hears more.
+        debug_nans: check every operation, and name the first that makes a NaN; slow.
+        settings: by name, in place of the preset's: any of ``train.py --help``.
+
+    Returns:
+        The run: ``policy``, ``metrics``, ``env``, and all else of :class:`attjax.runs.run.Run`.
+
+    Raises:
+        ValueError: something given is not as said.
+        FolderError: the folder holds a run already, or cannot be written.
+        Diverged: training met a number that is not finite.
+
+    Example:
+        >>> run = train("paper-fast", total_steps=2048, num_envs=64, rollout_length=16)
+        >>> run.agent_steps, run.env.frameskip
+        (2048, 20)
+    """
+    given = {"preset": preset, "seed": seed, "spacecraft": spacecraft}
+    if isinstance(preset, Settings):
+        given, settings = given | {"preset": run_config.CUSTOM}, preset.flat | settings
+    given = {name: x for name, x in (given | settings).items() if x is not None}
+    if not isinstance(callback, Observer):
+        callback = Observer() if callback is None else _Callback(callback)
+    if folder is None:
+        config = run_config.new(**given)
+        run = Run(config, assembly.of_config(config))
+        callback.started(run, None)
+        _train(run, callback, None, debug_nans)
+        return run
+    place = folder if isinstance(folder, Place) else Place(folder=Path(folder))
+    with run_folder.opened(place.folder):
+        keeper = Keeper(place, given)
+        callback.started(keeper.run, keeper.lengthened_from)
+        with keeper:
+            _train(keeper.run, callback, keeper, debug_nans)
+            keeper.save()
+    return keeper.run
+
+
+def _train(run, observer, keeper, debug_nans):
+    """Run blocks until the end, or until the observer wants to stop."""
+    start, compiled = time.monotonic(), None
+    if not run.is_complete and not observer.wants_to_stop():
+        compiled = run.compiled(debug_nans)
+    observer.compiled(run, compiled and time.monotonic() - start)
+    with contextlib.ExitStack() as stack:
+        stack.callback(observer.ended)
+        while compiled and not run.is_complete and not observer.wants_to_stop():
             try:
-                self.learner, block = train_block(self.env_params, self.learner, count)
-            except nan_search.NotFinite as found:
-                return self._divergence(self.update, count, str(found))
-            diverged = {name: int(update) for name, update in block["diverged"].items()}
-            if max(diverged.values()) >= 0:
-                first = min(update for update in diverged.values() if update >= 0)
-                names = ", ".join(name for name, update in diverged.items() if update == first)
-                return self._divergence(first, 1, names)
-            self.update += count
-            row = metrics.block_row(
-                block, self.settings.task.frameskips, self.agent_steps, time.monotonic() - start
-            )
-            self.terminal_error = row["terminal_error_deg"]
-            for log in self.logs:
-                log.append(row)
-            view.show(row)
-            if time.monotonic() - saved > save_every_s:
-                saver.save(self.learner, self.terminal_error)
-                saved = time.monotonic()
-        return None
-
-    def _divergence(self, update, count, what):
-        """One line that says in which of the updates what was not finite."""
-        steps = (update + count) * self.settings.ppo.steps_per_update
-        updates = f"update {update}" if count == 1 else f"updates {update} to {update + count - 1}"
-        kept = checkpoint.latest(self.folder)
-        kept = "no checkpoint yet" if kept is None else f"the good one of update {kept}"
-        return f"not finite at agent step {steps:,} ({updates}): {what}; {self.folder} has {kept}"
+                row = run.train_block(compiled)
+            except Diverged as error:
+                kept = f"; {keeper.describe_saved()}" if keeper else ""
+                raise Diverged(f"{error}{kept}") from None
+            if keeper:
+                keeper.add(row)
+            observer.block(row)

@@ -7,12 +7,12 @@ import sys
 import traceback
 from collections.abc import Callable
 
-from attjax.errors import UserError
+from attjax.errors import UserValueError
 
 NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
-class FunctionError(UserError, ValueError):
+class FunctionError(UserValueError):
     """A user's function cannot be used; the message is one line that names it."""
 
 

@@ -5,6 +5,7 @@ from commands import STEPS_PER_UPDATE, TINY, run
 from fuzzing import Accepted
 
 from attjax import evaluation, playback, training
+from attjax.commands import training_output
 
 jax.config.update("jax_num_cpu_devices", 2)  # what is shared out over devices is tested on two
 jax.config.update("jax_legacy_prng_key", "error")  # typed keys throughout
@@ -41,8 +42,8 @@ def no_work(monkeypatch):
         raise Accepted
 
     monkeypatch.setattr(evaluation, "fly", accept)
-    monkeypatch.setattr(training.Run, "train", accept)
-    monkeypatch.setattr(training.Run, "describe", lambda *_: None)
+    monkeypatch.setattr(training, "_train", accept)
+    monkeypatch.setattr(training_output.Terminal, "started", lambda *_: None)
 
 
 @pytest.fixture(scope="session")

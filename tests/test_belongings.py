@@ -7,10 +7,10 @@ import pytest
 from commands import STEPS_PER_UPDATE, train_script
 from test_checkpoint import CONFIG
 
-from attjax import belongings, checkpoint, run_folder
+from attjax import belongings, checkpoint, run_config, run_folder
 from attjax.run_folder import FolderError
 
-NEW = run_folder.Config("paper", 1, CONFIG.settings)
+NEW = run_config.Config("paper", 1, CONFIG.settings)
 
 
 def fake_checkpoint(path, run_id, error=1.0):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, presets, run_folder
-from attjax.run_folder import Config, FolderError
+from attjax.run_config import Config
+from attjax.run_folder import FolderError
 
 SETTINGS = presets.PRECISE.replace(
     frameskips=(5, 20),

@@ -5,7 +5,7 @@ import tomllib
 import pytest
 from commands import ROOT, one_line_error, run, train_script
 
-from attjax import config_file, presets, run_folder
+from attjax import config_file, presets, run_config, run_folder
 from attjax.errors import UserError
 from attjax.specification import LM50
 
@@ -13,8 +13,8 @@ from attjax.specification import LM50
 @pytest.mark.parametrize("preset", presets.PRESETS)
 def test_a_printed_file_reads_as_what_it_was_printed_from(tmp_path, preset):
     path = tmp_path / "run.toml"
-    path.write_text(config_file.text(run_folder.Config(preset, 7, presets.PRESETS[preset])))
-    expected = {"preset": preset, "seed": 7, "spacecraft": LM50} | vars(presets.PRESETS[preset])
+    path.write_text(config_file.text(run_config.Config(preset, 7, presets.PRESETS[preset])))
+    expected = {"preset": preset, "seed": 7, "spacecraft": LM50} | presets.PRESETS[preset].flat
     assert config_file.read(path) == expected
 
 
@@ -25,7 +25,7 @@ def test_flags_override_the_file_and_the_file_the_preset(tmp_path, capsys):
     printed = tomllib.loads(capsys.readouterr().out)
     assert (printed["preset"], printed["seed"]) == ("paper", 5)
     assert (printed["settings"]["clip"], printed["settings"]["num_envs"]) == (0.3, 32)
-    assert printed["settings"]["passes"] == presets.PAPER.passes
+    assert printed["settings"]["passes"] == presets.PAPER.ppo.passes
 
 
 def test_a_printed_file_reproduces_the_run_and_agrees_with_resuming_it(trained, tmp_path, capsys):

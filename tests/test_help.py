@@ -9,7 +9,15 @@ import time
 import pytest
 from commands import ROOT, TINY, eval_script, export_script, run, train_script
 
-from attjax import config_file, fields, help_text, presets, run_folder, settings, streams
+from attjax import (
+    config_file,
+    fields,
+    help_text,
+    presets,
+    run_config,
+    settings,
+    streams,
+)
 
 SCRIPTS = {"train.py": train_script, "eval.py": eval_script, "export.py": export_script}
 FIELDS = settings.FIELDS.values()
@@ -116,7 +124,7 @@ def test_errors_print_in_ascii():
 
 
 def test_a_printed_file_is_ascii_and_explains_every_setting():
-    text = config_file.text(run_folder.Config("paper", 3, presets.PAPER))
+    text = config_file.text(run_config.Config("paper", 3, presets.PAPER))
     assert text.isascii()
     lines = text.splitlines()
     assert max(map(len, lines)) <= 100

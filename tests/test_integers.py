@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 
 import attjax
-from attjax import (
-    AttitudeEnv,
-    controllers,
-    evaluation,
-    presets,
-    run_folder,
-)
+from attjax import AttitudeEnv, controllers, evaluation, presets, run_config
 from attjax.specification import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
@@ -30,7 +24,7 @@ def test_integers_are_integers_whoever_made_them(integer):
     assert attjax.step(state, integer(1), params, integer(20)).time == 1
     given = evaluation.conditions(env, params, integer(3), integer(4))
     assert json.loads(json.dumps(given))["seed"] == 3
-    config = run_folder.Config("paper", integer(3), presets.PAPER)
+    config = run_config.Config("paper", integer(3), presets.PAPER)
     assert type(config.seed) is int
 
 

@@ -71,7 +71,7 @@ def test_records_figures_pages_and_vectors_fly_what_the_environment_does(monkeyp
     """In the perfect world a spacecraft at rest is told so, and stays at rest."""
     env = Weak(20, spacecraft=SHORT)
     params, (rates, torques) = env.default_params, braking()
-    flight = plots.Flight(BRAKE, env, params, 0, flown=None)
+    flight = plots.Flight(BRAKE, env, params, 0, episodes=1)
     _, history = flight.table_5
     page = embedded(playback.page({"brake": BRAKE}, env, params, 0))["flights"][:, 0]
     for slew in range(3):

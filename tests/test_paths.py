@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from commands import eval_script, export_script, one_line_error, python, train_script
 
-from attjax import cli, config_file, presets, run_folder
+from attjax import cli, config_file, presets, run_config, run_folder
 
 SCRIPTS = {"train.py": train_script, "eval.py": eval_script, "export.py": export_script}
 
@@ -72,14 +72,14 @@ def test_a_new_folder_may_hold_hidden_files_and_the_log_of_its_own_run(tmp_path)
     (tmp_path / "lost+found").mkdir()
     code = f"""
 from pathlib import Path
-from attjax import presets, run_folder
-config = run_folder.Config("paper", 0, presets.PAPER)
+from attjax import presets, run_config, run_folder
+config = run_config.Config("paper", 0, presets.PAPER)
 run_folder.create(Path({str(tmp_path)!r}), config, overwrite=False)
 """
     with (tmp_path / "log").open("w") as log:
         assert python(code, capture_output=False, stdout=log, stderr=log).returncode == 0
     (tmp_path / run_folder.CONFIG).unlink()
-    config = run_folder.Config("paper", 0, presets.PAPER)
+    config = run_config.Config("paper", 0, presets.PAPER)
     with pytest.raises(run_folder.FolderError, match="holds no attjax run, but log; choose"):
         run_folder.create(tmp_path, config, overwrite=False)
     (tmp_path / "log").unlink()

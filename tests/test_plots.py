@@ -19,8 +19,7 @@ CURVE = [dict(zip(COLUMNS, row)) for row in ROWS]
 
 def fly():
     params = ENV.default_params.replace(max_steps_in_episode=jnp.array(400, jnp.int32))
-    flown = evaluation.fly(CONTROLLER, ENV, params, jax.random.key(2), 100)
-    return plots.Flight(CONTROLLER, ENV, params, 2, flown)
+    return plots.Flight(CONTROLLER, ENV, params, 2, 100)
 
 
 @pytest.fixture(scope="module")

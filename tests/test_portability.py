@@ -8,7 +8,7 @@ import pytest
 from commands import TINY, run
 from test_checkpoint import SETTINGS
 
-from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, run_folder, step
+from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, run_config, run_folder, step
 from attjax.networks import Policy
 
 
@@ -53,7 +53,7 @@ def test_policy_and_value_ask_for_full_precision_products(features):
 def test_a_run_on_two_devices_goes_on_on_one(tmp_path):
     setup = assembly.setup(SETTINGS, num_devices=2)
     state = learner.init(setup, assembly.env_params(setup), jax.random.key(0))
-    run_folder.create(tmp_path, run_folder.Config("precise", 0, SETTINGS), overwrite=False)
+    run_folder.create(tmp_path, run_config.Config("precise", 0, SETTINGS), overwrite=False)
     with checkpoint.Saver(tmp_path) as saver:
         saver.save(state)
     setup = assembly.setup(SETTINGS)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from test_checkpoint import CONFIG
 
-from attjax import run_folder
+from attjax import run_config, run_folder
 from attjax.presets import PRECISE
 from attjax.run_folder import FolderError
 
@@ -29,7 +29,7 @@ def test_a_configuration_that_cannot_be_written_leaves_the_old_one(tmp_path, mon
 
     monkeypatch.setattr(run_folder.os, "replace", full)
     with pytest.raises(FolderError, match="No space left on device"):
-        run_folder.write_config(tmp_path, run_folder.Config("paper", 1, CONFIG.settings))
+        run_folder.write_config(tmp_path, run_config.Config("paper", 1, CONFIG.settings))
     assert run_folder.read_config(tmp_path) == CONFIG
 
 
@@ -126,7 +126,7 @@ def test_files_that_are_no_configuration_are_refused(tmp_path, text):
 def test_only_one_process_trains_in_a_folder(tmp_path):
     script = f"""
 import pathlib, sys
-from attjax import run_folder
+from attjax import run_config, run_folder
 with run_folder.opened(pathlib.Path({str(tmp_path)!r})):
     print("open", flush=True)
     sys.stdin.read()

@@ -21,7 +21,7 @@ from attjax import (
     specification,
 )
 from attjax.presets import PAPER
-from attjax.run_folder import Config
+from attjax.run_config import Config
 from attjax.specification import LM50
 
 CUBESAT = Spacecraft(

@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from attjax import cli, config_file, destinations, devices, errors, run_folder
+from attjax import cli, config_file, destinations, devices, errors, run_config, run_folder
 from attjax.commands import evaluation_output
 from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
 
@@ -86,7 +86,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         devices.select_device(arguments.device)
         names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
         trained = _trained(arguments, names)
-        arguments.frameskip = cli.frameskip(arguments.frameskip, trained)
+        if arguments.frameskip is None:
+            arguments.frameskip = run_config.frameskip_to_judge(trained or ())
         spacecraft = _spacecraft(arguments, names)
         controllers = {name: _controller(name, arguments, spacecraft) for name in names}
         if arguments.json not in (None, STDOUT):
@@ -108,24 +109,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file):
     """Fly, draw, write and print."""
     # Imported late: with them, --help and errors in the arguments would take seconds.
-    import jax
-
     from attjax import evaluation, report
     from attjax.env import AttitudeEnv
 
     env = AttitudeEnv(arguments.frameskip, spacecraft=spacecraft)
-    params = env.default_params
-    start = time.monotonic()
-    seed, results, written = arguments.seed or 0, [], []
-    conditions = evaluation.conditions(env, params, seed, arguments.episodes)
+    params, seed, episodes = env.default_params, arguments.seed or 0, arguments.episodes
+    start, results, written = time.monotonic(), [], []
     for name, controller in controllers.items():
-        flown = evaluation.fly(controller, env, params, jax.random.key(seed), arguments.episodes)
-        statistics = evaluation.statistics(flown, env, params)
-        results.append({"controller": name} | conditions | statistics)
+        judged = evaluation.evaluate(controller, env, episodes=episodes, seed=seed)
+        results.append({"controller": name} | judged)
         if plots:
             folder = arguments.plot / name if arguments.compare else arguments.plot
-            flight = plots.Flight(controller, env, params, seed, flown)
-            written += plots.write_all(flight, folder, metrics if name == POLICY else [])
+            flight = plots.Flight(controller, env, params, seed, episodes)
+            rows = metrics if name == POLICY else []
+            written += evaluation_output.draw(flight, rows, folder)
     seconds = time.monotonic() - start
     try:
         if json_file:

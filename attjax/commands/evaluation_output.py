@@ -4,7 +4,7 @@ import json
 import os
 from pathlib import Path
 from types import ModuleType
-from typing import TextIO
+from typing import Any, TextIO
 
 from attjax import destinations, errors, run_folder
 
@@ -73,8 +73,20 @@ def write_json(file: Path | TextIO, content: dict) -> None:
         print(text, end="", file=file, flush=True)
 
 
+def draw(flight: Any, rows: list[dict], folder: Path) -> list[Path]:
+    """Draw a :class:`attjax.plots.Flight`, and the training before it where there are its rows.
+
+    Returns:
+        The files written.
+    """
+    from attjax import learning_curve, plots
+
+    written = plots.write_all(flight, folder)
+    return written + learning_curve.write(rows, flight.is_the_papers, folder)
+
+
 def metrics_rows(folder: Path) -> list[dict]:
     """The rows of a run's metrics.csv, for the learning curve."""
-    from attjax import metrics
+    from attjax import metrics_file
 
-    return metrics.read_rows(folder / run_folder.METRICS)
+    return metrics_file.read_rows(folder / run_folder.METRICS)

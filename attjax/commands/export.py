@@ -5,7 +5,7 @@ import contextlib
 import importlib
 from collections.abc import Sequence
 
-from attjax import c_names, cli, destinations, devices, errors, run_folder
+from attjax import c_names, cli, destinations, devices, errors, run_config, run_folder
 
 FORMATS = {"c": "export_c", "onnx": "export_onnx", "stablehlo": "export_stablehlo"}
 NEEDED = {"export_onnx": "onnx", "export_stablehlo": "flatbuffers"}
@@ -102,7 +102,9 @@ def _flight_policy(arguments):
             f"the policy in {folder} sees {config.settings.network.features}, which --format "
             f"{arguments.format} does not know; stablehlo does"
         )
-    frameskip = cli.frameskip(arguments.frameskip, config.settings.task.frameskips)
+    frameskip = arguments.frameskip
+    if frameskip is None:
+        frameskip = run_config.frameskip_to_judge(config.settings.task.frameskips)
     with _exporting(folder):
         env = AttitudeEnv(frameskip, spacecraft=config.spacecraft)
         return FlightPolicy(policy, params, env, provenance.of_run(config, update, newest))

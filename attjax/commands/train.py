@@ -1,14 +1,10 @@
 """Train a neural attitude controller by PPO, in a vectorised simulator."""
 
 import argparse
-import dataclasses
-import importlib
 from collections.abc import Sequence
 
-from attjax import cli, config_file, devices, errors, fields, presets, run_folder, signals
-from attjax.specification import LM50
+from attjax import cli, config_file, devices, errors, fields, presets, run_config, signals
 
-DEFAULT_PRESET = "precise"
 USAGE = "%(prog)s [--preset NAME] [--checkpoint FOLDER] [--resume] [FLAG ...]"
 EXAMPLES = """\
 An agent step is an impulse and the free rotation after it. Symbols, equations
@@ -29,7 +25,7 @@ def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     """The command line."""
     parser = cli.Parser(usage=USAGE, description=__doc__, epilog=cli.examples(EXAMPLES))
     groups = {name: parser.add_argument_group(title) for name, title in fields.GROUPS.items()}
-    preset_help = f"the recipe; flags override it (default: {DEFAULT_PRESET})"
+    preset_help = f"the recipe; flags override it (default: {run_config.DEFAULT_PRESET})"
     groups["run"].add_argument("--preset", choices=presets.PRESETS, help=preset_help)
     craft_help = "TOML file that describes the spacecraft and its task (default: LM50, the paper's)"
     groups["task"].add_argument("--spacecraft", type=cli.path, metavar="FILE", help=craft_help)
@@ -68,30 +64,40 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parse_arguments(argv)
     with errors.one_line_errors(ValueError):
         given = _given(arguments)
-        new = _new_config(**given)
+        new = run_config.new(**given)
     if arguments.print_config:
         print(config_file.text(new), end="")
         return 0
     with signals.StopSignals() as stop, errors.one_line_errors():
-        if arguments.tensorboard:
-            _check_tensorboard()
-        device = devices.select_device(arguments.device)
-        advice = "fewer --num-envs or a shorter --rollout-length take less"
-        with run_folder.opened(arguments.checkpoint), errors.enough_memory(advice):
-            run = _open(arguments, given, new, stop)
-            if arguments.tensorboard:
-                run.write_events()
-            run.describe(device)
-            return run.train(arguments.save_every, arguments.debug_nans)
+        place = {
+            "folder": arguments.checkpoint,
+            "resume": arguments.resume,
+            "overwrite": arguments.overwrite,
+            "save_every": arguments.save_every,
+            "tensorboard": arguments.tensorboard,
+        }
+        return _train(given, place, stop, arguments)
 
 
-def _check_tensorboard():
-    """Fail before anything is written."""
+def _train(given, place, stop, arguments):
+    device = devices.select_device(arguments.device)
+    # Imported late: with them, --help and errors in the arguments would take seconds.
+    from attjax import training
+    from attjax.commands import training_output
+    from attjax.keeper import Place
+    from attjax.run import Diverged
+
+    place = Place(**place)
+    view = training_output.Terminal(place.folder, device, stop)
+    advice = "fewer --num-envs or a shorter --rollout-length take less"
     try:
-        importlib.import_module("tensorboardX")
-    except ImportError:
-        needed = "--tensorboard needs tensorboardX: pip install 'attjax[tensorboard]'"
-        raise errors.UserError(needed) from None
+        with errors.enough_memory(advice):
+            run = training.train(
+                **given, folder=place, callback=view, debug_nans=arguments.debug_nans
+            )
+    except Diverged as error:
+        return training_output.diverged(error)
+    return view.outcome(run)
 
 
 def _given(arguments):
@@ -103,55 +109,3 @@ def _given(arguments):
     if arguments.spacecraft is not None:
         given["spacecraft"] = config_file.read_spacecraft(arguments.spacecraft)
     return given | cli.overrides(arguments)
-
-
-def _new_config(preset=DEFAULT_PRESET, seed=0, spacecraft=LM50, **settings):
-    return run_folder.Config(preset, seed, presets.PRESETS[preset].replace(**settings), spacecraft)
-
-
-def _open(arguments, given, new, stop):
-    """The folder's run, new or continued."""
-    # Imported late: with it, --help and errors in the arguments would take seconds.
-    from attjax import training
-
-    folder = arguments.checkpoint
-    resumes = arguments.resume and run_folder.holds_run(folder)
-    if not resumes:
-        # Before a run gives way to this one: it fails where a user's function cannot be used.
-        setup = _setup(new)
-        run_folder.create(folder, new, arguments.overwrite)
-        run = training.Run(folder, new, setup, stop)
-    else:
-        old = run_folder.read_config(folder)
-        longer = _resumed_config(given, old)
-        run = training.Run(folder, longer, _setup(longer), stop)
-        if longer != old:
-            run.announce_longer(old.settings)
-            run_folder.write_config(folder, longer)
-    return run
-
-
-def _setup(config):
-    from attjax import assembly
-
-    num_devices = assembly.num_devices(config.settings)
-    try:
-        return assembly.setup(config.settings, config.spacecraft, num_devices)
-    except ValueError as error:
-        raise errors.UserError(error) from None
-
-
-def _resumed_config(given, config):
-    """What the folder's run was started with, with a larger total if one was asked for."""
-    total = given.get("total_steps", config.settings.ppo.total_steps)
-    run = vars(config) | config.settings.flat | {"total_steps": total}
-    differing = [name for name, value in given.items() if run[name] != value]
-    if differing:
-        listed = ", ".join(f"{name} ({run[name]})" for name in differing)
-        raise errors.UserError(f"--resume keeps the run's settings; leave out {listed}")
-    if total < config.settings.ppo.total_steps:
-        raise errors.UserError(
-            f"--total-steps is {total}; to resume, it must be at least the run's "
-            f"{config.settings.ppo.total_steps}"
-        )
-    return dataclasses.replace(config, settings=config.settings.replace(total_steps=total))

@@ -1,0 +1,84 @@
+"""What ``train.py`` prints of a run: what it is, how it goes, how it ended."""
+
+from attjax import cli, errors, learner
+from attjax.progress import Progress
+from attjax.run import Diverged, Run
+from attjax.settings import Settings
+from attjax.signals import StopSignals
+from attjax.training import Observer
+
+DIVERGED = 3
+
+
+class Terminal(Observer):
+    """Shows a run on the terminal, or in a log, and ends it where a signal asks for that.
+
+    Args:
+        folder: of the run, as the user wrote it.
+        device: that computes.
+        stop: the signals.
+    """
+
+    def __init__(self, folder, device, stop: StopSignals):
+        self._folder, self._device, self._stop, self._progress = folder, device, stop, None
+
+    def started(self, run: Run, lengthened_from: Settings | None) -> None:
+        """Print what the run is, and where it stands."""
+        if lengthened_from is not None:
+            _announce_longer(run, lengthened_from)
+        config, device = run.config, self._device
+        ppo = config.settings.ppo
+        print(
+            f"preset {config.preset}, {config.spacecraft.name}, seed {config.seed}, "
+            f"{run.total_steps:,} agent steps "
+            f"({ppo.num_updates:,} updates of {ppo.steps_per_update:,}) on "
+            f"{run.setup.num_devices} x {device.device_kind} ({device.platform}), in {self._folder}"
+        )
+        if run.update:
+            print(f"resumed at {run.agent_steps:,} agent steps")
+
+    def compiled(self, run: Run, seconds: float | None) -> None:
+        """Print how long that took, and begin to show the progress."""
+        if seconds is not None:
+            print(f"compiled in {seconds:.1f} s", flush=True)
+        self._progress = Progress(run.total_steps, run.agent_steps, run.rows, self._stop)
+        self._progress.__enter__()
+
+    def block(self, row: dict) -> None:
+        """Show it."""
+        self._progress.show(row)
+
+    def wants_to_stop(self) -> bool:
+        """Whether a signal was received."""
+        return self._stop.received is not None
+
+    def ended(self) -> None:
+        """Leave the last state of the progress."""
+        self._progress.__exit__(None, None, None)
+
+    def outcome(self, run: Run) -> int:
+        """Print how it ended; returns the exit status."""
+        if self._stop.received is not None:
+            print(f"stopped and saved at {run.agent_steps:,} agent steps; continue with --resume")
+            return 128 + self._stop.received
+        folder = cli.quoted(self._folder)
+        print(f"trained; evaluate with: {cli.invocation('eval')} --checkpoint {folder}")
+        return 0
+
+
+def diverged(error: Diverged) -> int:
+    """Print what was not finite; returns the exit status."""
+    errors.error_line(error)
+    return DIVERGED
+
+
+def _announce_longer(run, before):
+    """Print what a larger total than before changes from here on."""
+    old, new = before.ppo, run.config.settings.ppo
+    steps = run.update * new.passes * new.minibatches
+    slow, fast = (learner.learning_rate(ppo, steps) for ppo in (old, new))
+    print(
+        f"total steps raised from {old.total_steps:,} to {new.total_steps:,}: "
+        f"at {run.agent_steps:,} the learning rate goes from {slow:.3g} to {fast:.3g}, and from "
+        f"there to {new.final_learning_rate:.3g} at the new end; the entropy bonus likewise"
+    )

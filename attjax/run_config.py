@@ -1,0 +1,90 @@
+"""What a training run is started with, and what it may be continued with."""
+
+import dataclasses
+import operator
+
+from attjax.errors import UserError
+from attjax.presets import PRECISE, PRESETS
+from attjax.settings import Settings
+from attjax.specification import LM50, Spacecraft
+
+DEFAULT_PRESET = "precise"
+TABLE_2 = 5
+"""Frameskip of the paper's Table 2, 40 Hz."""
+
+CUSTOM = "custom"
+"""The preset's name in a run whose settings were all given."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """What a run was started with.
+
+    Raises:
+        ValueError: an agent step takes longer than the spacecraft's episode.
+    """
+
+    preset: str
+    seed: int
+    settings: Settings
+    spacecraft: Spacecraft = LM50
+
+    def __post_init__(self):
+        object.__setattr__(self, "seed", operator.index(self.seed))
+        longest = max(self.settings.task.frameskips)
+        if self.spacecraft.max_steps(longest) < 1:
+            raise ValueError(
+                f"frameskips holds {longest}; in {self.spacecraft.duration} s, the duration of an "
+                f"episode, it must be at most {self.spacecraft.max_steps(0) - 1}"
+            )
+
+
+def new(
+    preset: str = DEFAULT_PRESET, seed: int = 0, spacecraft: Spacecraft = LM50, **values
+) -> Config:
+    """The configuration of a new run: a preset, but for settings given by name.
+
+    Raises:
+        ValueError: the preset is unknown, or something is not as :class:`Settings` says.
+
+    Example:
+        >>> new("paper", num_envs=64).settings.ppo.num_envs
+        64
+    """
+    if preset not in (*PRESETS, CUSTOM):
+        raise ValueError(f"preset is {preset!r}; it must be one of {', '.join(PRESETS)}")
+    return Config(preset, seed, PRESETS.get(preset, PRECISE).replace(**values), spacecraft)
+
+
+def frameskip_to_judge(trained: tuple[int, ...] = ()) -> int:
+    """Table 2's frameskip, or the trained one that is nearest to it, the quicker of two.
+
+    Example:
+        >>> frameskip_to_judge((7, 3, 20)), frameskip_to_judge()
+        (3, 5)
+    """
+    return min(trained or [TABLE_2], key=lambda k: (abs(k - TABLE_2), k))
+
+
+def lengthened(config: Config, given: dict) -> Config:
+    """What a run was started with, with a larger total of steps if one is given.
+
+    Args:
+        config: of the run.
+        given: preset, seed, spacecraft and settings, by name, that it is to be continued with.
+
+    Raises:
+        UserError: one of them is not the run's, or the total is smaller.
+    """
+    before = config.settings.ppo.total_steps
+    total = given.get("total_steps", before)
+    run = vars(config) | config.settings.flat | {"total_steps": total}
+    differing = [name for name, value in given.items() if run[name] != value]
+    if differing:
+        listed = ", ".join(f"{name} ({run[name]})" for name in differing)
+        raise UserError(f"--resume keeps the run's settings; leave out {listed}")
+    if total < before:
+        raise UserError(
+            f"--total-steps is {total}; to resume, it must be at least the run's {before}"
+        )
+    return dataclasses.replace(config, settings=config.settings.replace(total_steps=total))
