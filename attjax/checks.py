@@ -10,8 +10,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from attjax.values import check_moments
+
 UNIT_TOLERANCE = 1e-3
 """Largest ‖q‖ − 1 that is taken for rounding."""
+
+ROUNDING = 1e-5
+"""Of an inertia, relatively: arrays are of single precision, and so are a tensor's moments."""
 
 
 def has_value(x) -> bool:
@@ -126,7 +131,7 @@ def inertia(x):
     x = real("inertia", x, (3,), (3, 3))
     if has_value(x):
         values = np.asarray(x, float)
-        rounding = 1e-5 * np.max(np.abs(values))
+        rounding = ROUNDING * np.max(np.abs(values))
         if values.ndim == 2 and not np.allclose(values, values.T, rtol=0, atol=rounding):
             raise ValueError(f"inertia is {_shown(values)}; it must be symmetric")
         moments = np.sort(values if values.ndim == 1 else np.linalg.eigvalsh(values))
@@ -134,11 +139,7 @@ def inertia(x):
             raise ValueError(
                 f"inertia has principal moments {_shown(moments)}; they must be positive"
             )
-        if moments[2] > (moments[0] + moments[1]) * (1 + 1e-5):
-            raise ValueError(
-                f"inertia has principal moments {_shown(moments)}; "
-                f"none may be larger than the other two together"
-            )
+        check_moments(moments, ROUNDING)
     return x
 
 

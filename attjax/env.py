@@ -52,7 +52,7 @@ class AttitudeEnv:
     spacecraft: Spacecraft = LM50
 
     def __post_init__(self):
-        most = self.spacecraft.max_steps(0) - 1
+        most = self.spacecraft.most_frameskip
         frameskip = integer(self.frameskip)
         if frameskip is None or not 0 <= frameskip <= most:
             raise ValueError(

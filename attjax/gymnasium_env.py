@@ -5,13 +5,18 @@ Importing this module registers ``attjax/Slew-v0`` for ``gymnasium.make`` and
 extra ``gym``.
 """
 
+from collections.abc import Callable
+
+import chex
 import gymnasium
 import numpy as np
 
 from attjax import checks, programs
-from attjax.env import steps_key
-from attjax.gymnasium_task import Task, check_not_forked, outer_time_limit, random_key
+from attjax.env import AttitudeEnv, steps_key
+from attjax.gymnasium_task import Options, Task, check_not_forked, outer_time_limit, random_key
 from attjax.gymnasium_vector import SlewVectorEnv
+from attjax.reward import Transition
+from attjax.spacecraft import EnvParams
 from attjax.values import integer
 
 __all__ = ["ID", "SlewEnv", "SlewVectorEnv"]
@@ -54,14 +59,14 @@ class SlewEnv(Task, gymnasium.Env):
 
     def __init__(
         self,
-        frameskip=20,
-        reward="paper",
-        env=None,
-        params=None,
-        render_mode=None,
-        rate_margin=0.99,
+        frameskip: int = 20,
+        reward: str | Callable[[Transition], chex.Array] = "paper",
+        env: AttitudeEnv | None = None,
+        params: EnvParams | None = None,
+        render_mode: str | None = None,
+        rate_margin: float = 0.99,
     ):
-        self._set_task(1, frameskip, reward, env, params, None, render_mode, rate_margin)
+        self._set_task(Options(frameskip, reward, env, params, render_mode, rate_margin))
         self._own_limit = int(self._params.max_steps_in_episode)
         self.observation_space, self.action_space = self._spaces()
 

@@ -1,11 +1,14 @@
 """What one spacecraft and a vector of them have in common under Gymnasium: the task."""
 
 import copy
+import dataclasses
 import functools
 import numbers
 import os
 import sys
+from collections.abc import Callable
 
+import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,7 +21,8 @@ from jax._src.xla_bridge import backends_are_initialized
 from attjax import networks
 from attjax import observation as observations
 from attjax.env import AttitudeEnv
-from attjax.reward import REWARDS
+from attjax.reward import REWARDS, Transition
+from attjax.spacecraft import EnvParams
 
 ROUNDING = 1e-6
 """By how much, relatively, rounding may carry an observation beyond its bounds."""
@@ -34,28 +38,49 @@ class ForkedError(SystemExit, RuntimeError):
     """
 
 
-class Task:
-    """A mixin: environment, parameters, spaces, time limit, mask and pictures."""
+@dataclasses.dataclass(frozen=True, eq=False)
+class Options:
+    """What one spacecraft and a vector of them take alike: see :class:`gymnasium_env.SlewEnv`.
 
-    def _set_task(self, num_envs, frameskip, reward, env, params, limit, render_mode, margin):
-        check_not_forked()
+    Raises:
+        ValueError: one is not as said there.
+    """
+
+    frameskip: int = 20
+    reward: str | Callable[[Transition], chex.Array] = "paper"
+    env: AttitudeEnv | None = None
+    params: EnvParams | None = None
+    render_mode: str | None = None
+    rate_margin: float = 0.99
+
+    def __post_init__(self):
+        reward, margin = self.reward, self.rate_margin
         if not callable(reward) and reward not in REWARDS:
             allowed = ", ".join(map(repr, REWARDS))
             raise ValueError(f"reward is {reward!r}; it must be {allowed} or a function")
-        if render_mode not in RENDER_MODES:
-            raise ValueError(f"render_mode is {render_mode!r}; it must be None or 'rgb_array'")
+        if self.render_mode not in RENDER_MODES:
+            raise ValueError(f"render_mode is {self.render_mode!r}; it must be None or 'rgb_array'")
         if not (isinstance(margin, numbers.Real) and 0 < margin <= 1):
             raise ValueError(f"rate_margin is {margin!r}; it must be above 0 and at most 1")
+
+
+class Task:
+    """A mixin: environment, parameters, spaces, time limit, mask and pictures."""
+
+    def _set_task(self, options: Options, num_envs: int = 1, limit: int | None = None) -> None:
+        check_not_forked()
+        env = options.env
         if env is None:
-            env = AttitudeEnv(frameskip, reward=REWARDS.get(reward, reward))
+            reward = REWARDS.get(options.reward, options.reward)
+            env = AttitudeEnv(options.frameskip, reward=reward)
         self._env = env
-        self._params = env.default_params if params is None else params
+        self._params = env.default_params if options.params is None else options.params
         self._set_limit(limit)
         env.reset(jax.random.key(0), self._params)  # checks the parameters, which have values here
-        self._num_envs, self._rate_margin = num_envs, margin
+        self._num_envs, self._rate_margin = num_envs, options.rate_margin
         self._spec = self._state = self._renderer = None
-        self.render_mode = render_mode
-        if render_mode is not None:
+        self.render_mode = options.render_mode
+        if self.render_mode is not None:
             _rendering()  # so that a missing package is told of at once
         context = env.context(self._params)
         self.metadata = self.metadata | {"render_fps": float(1 / context.control_period)}

@@ -6,7 +6,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from attjax import checks, programs
-from attjax.gymnasium_task import Task, check_not_forked, random_key, starting_key
+from attjax.gymnasium_task import Options, Task, check_not_forked, random_key, starting_key
 from attjax.values import integer
 
 EACH_ITS_OWN = ("action_masks", "render")
@@ -25,9 +25,10 @@ class SlewVectorEnv(Task, VectorEnv):
 
     Args:
         num_envs: spacecraft.
-        frameskip, reward, env, params, max_episode_steps, render_mode, rate_margin: as
-            :class:`attjax.gymnasium_env.SlewEnv`; the same for all.
+        max_episode_steps: time limit, agent steps; None leaves the task's.
         autoreset_mode: a ``gymnasium.vector.AutoresetMode`` or its value, as "NextStep".
+        options: ``frameskip``, ``reward``, ``env``, ``params``, ``render_mode`` and
+            ``rate_margin``, as :class:`attjax.gymnasium_env.SlewEnv`; the same for all.
 
     Raises:
         ValueError: an argument is not as said.
@@ -47,23 +48,17 @@ class SlewVectorEnv(Task, VectorEnv):
 
     def __init__(
         self,
-        num_envs=1,
-        frameskip=20,
-        reward="paper",
-        env=None,
-        params=None,
-        max_episode_steps=None,
-        render_mode=None,
-        rate_margin=0.99,
-        autoreset_mode=AutoresetMode.SAME_STEP,
+        num_envs: int = 1,
+        *,
+        max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+        **options,
     ):
         self.num_envs = _positive("num_envs", num_envs)
         self.autoreset_mode = _mode(autoreset_mode)
         self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
         limit = None if max_episode_steps == -1 else max_episode_steps  # -1: as gymnasium.make
-        self._set_task(
-            self.num_envs, frameskip, reward, env, params, limit, render_mode, rate_margin
-        )
+        self._set_task(Options(**options), self.num_envs, limit)
         self.single_observation_space, self.single_action_space = self._spaces()
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)

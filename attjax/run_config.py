@@ -32,10 +32,10 @@ class Config:
     def __post_init__(self):
         object.__setattr__(self, "seed", operator.index(self.seed))
         longest = max(self.settings.task.frameskips)
-        if self.spacecraft.max_steps(longest) < 1:
+        if longest > self.spacecraft.most_frameskip:
             raise ValueError(
                 f"frameskips holds {longest}; in {self.spacecraft.duration} s, the duration of an "
-                f"episode, it must be at most {self.spacecraft.max_steps(0) - 1}"
+                f"episode, it must be at most {self.spacecraft.most_frameskip}"
             )
 
 

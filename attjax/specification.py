@@ -10,7 +10,7 @@ import operator
 import tomllib
 from pathlib import Path
 
-from attjax.values import check_number, check_numbers, plain, shown
+from attjax.values import check_moments, check_number, check_numbers, plain, shown
 
 INTEGRATION_STEP = 1 / 240
 """Length of one RK4 step, s (paper, section 2.3)."""
@@ -20,7 +20,10 @@ NEEDED = ("inertia", "torque_levels")
 
 LEAST_MOMENT, MOST_MOMENT, LEAST_RATIO = 1e-9, 1e9, 1e-3
 ROUNDING = 1e-6
-"""Less than what the simulator's own checks let pass, in single precision."""
+"""Less than what the simulator's own checks let pass, :data:`attjax.checks.ROUNDING`.
+
+What a description may be thus passes there too, once its numbers are in single precision.
+"""
 
 MOST_TURNS = 2e5
 """Radians of an episode at the rate limit, times the ratio of the moments, of a full tensor.
@@ -126,10 +129,7 @@ class Spacecraft:
                 f"inertia has principal moments {listed}; the least must be at least "
                 f"{LEAST_RATIO:g} of the largest"
             )
-        if moments[2] > (moments[0] + moments[1]) * (1 + ROUNDING):
-            raise ValueError(
-                f"inertia has principal moments {listed}; none may exceed the other two together"
-            )
+        check_moments(moments, ROUNDING)
         return moments[0], moments[2] / moments[0] if is_tensor else 1
 
     def _check_axes(self):
@@ -175,6 +175,11 @@ class Spacecraft:
             for sign in (1, -1)
         ]
         return [[0.0, 0.0, 0.0], *signed]
+
+    @property
+    def most_frameskip(self) -> int:
+        """The largest frameskip: one agent step is then the whole episode."""
+        return self.max_steps(0) - 1
 
     def max_steps(self, frameskip: int) -> int:
         """Whole agent steps in an episode, for that many RK4 steps after the first in each."""

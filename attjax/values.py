@@ -56,6 +56,27 @@ def check_numbers(name: str, values, low=-math.inf, high=math.inf, count=None) -
         raise ValueError(f"{name} is {shown(values)}; they must be {allowed}")
 
 
+def check_moments(moments, rounding: float) -> None:
+    """Check that no principal moment of inertia exceeds the other two together.
+
+    Of no rigid body does one: each is made of the squares of two of its three coordinates.
+
+    Args:
+        moments: three numbers, in ascending order.
+        rounding: of the numbers, relatively: more in a tensor of single precision, whose moments
+            were computed, than in what a user wrote.
+
+    Raises:
+        ValueError: one does.
+    """
+    least, middle, largest = moments
+    if largest > (least + middle) * (1 + rounding):
+        listed = ", ".join(f"{x:g}" for x in moments)
+        raise ValueError(
+            f"inertia has principal moments {listed}; none may exceed the other two together"
+        )
+
+
 def _is_number(x):
     return isinstance(x, int | float) and not isinstance(x, bool)
 

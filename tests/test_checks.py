@@ -5,7 +5,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, EnvState, checks, controllers, dynamics, step, vector
+from attjax import (
+    AttitudeEnv,
+    EnvState,
+    Spacecraft,
+    checks,
+    controllers,
+    dynamics,
+    step,
+    vector,
+)
 from attjax.networks import Policy
 
 ENV = AttitudeEnv(frameskip=5)
@@ -66,9 +75,9 @@ def test_actions(action, expected):
     [
         ("inertia", [1.0, 0, 1], "principal moments [0. 1. 1.]; they must be positive"),
         ("inertia", [1.0, -1, 1], "they must be positive"),
-        ("inertia", [1.0, 1, 2.1], "none may be larger than the other two together"),
+        ("inertia", [1.0, 1, 2.1], "1, 1, 2.1; none may exceed the other two together"),
         ("inertia", np.eye(3) + np.eye(3, k=1) / 9, "it must be symmetric"),
-        ("inertia", np.diag([1.0, 1, 3]), "none may be larger"),
+        ("inertia", np.diag([1.0, 1, 3]), "1, 1, 3; none may exceed"),
         ("inertia", [1.0, np.nan, 1], "it must be finite"),
         ("inertia", np.ones((3, 2)), "inertia has shape (3, 2); it must be (3,) or (3, 3)"),
         ("rate_limit", 0.0, "rate_limit is 0; it must be above 0"),
@@ -141,3 +150,13 @@ def test_actions_from_python_are_refused_in_one_line(action):
         checks.action(action, 19)
     with pytest.raises(ValueError, match=r"^actions (has|holds) .*; (it|each) must be [^\n]*$"):
         checks.actions([action] if np.ndim(action) == 0 else action, 1, 19)
+
+
+def test_descriptions_and_arrays_refuse_a_moment_in_the_same_words():
+    """And what a description may be passes in single precision, too."""
+    for inertia in ((1, 1, 2 + 4e-5), ((1, 0, 0), (0, 3, 0), (0, 0, 1))):
+        described = message(lambda inertia: Spacecraft(inertia=inertia), inertia)
+        assert described == message(checks.inertia, jnp.array(inertia, float))
+        assert "none may exceed the other two together" in described
+    edge = Spacecraft(inertia=(1, 1, 2 + 1.8e-6)).inertia
+    checks.inertia(jnp.array(edge, float))

@@ -51,6 +51,7 @@ def test_lists_and_arrays_will_do():
 def test_episodes_are_whole_agent_steps_of_the_duration():
     assert [LM50.max_steps(frameskip) for frameskip in (5, 20)] == [1750, 500]
     assert CUBESAT.max_steps(23) == 900
+    assert LM50.most_frameskip == 10_499 and LM50.max_steps(10_499) == 1
     with pytest.raises(ValueError, match="frameskip is 300; it must be an integer from 0 to 239"):
         AttitudeEnv(300, spacecraft=Spacecraft(duration=1.0))
 
