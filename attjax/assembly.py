@@ -7,10 +7,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import learner, observation, spacecraft, user_functions
+from attjax import assurance, learner, spacecraft, user_functions
 from attjax.env import AttitudeEnv
 from attjax.errors import UserValueError
-from attjax.networks import FEATURES, Policy, rate_mask
+from attjax.features import FEATURES
+from attjax.networks import Policy
 from attjax.reward import REWARDS
 from attjax.run_config import Config
 from attjax.settings import Settings
@@ -76,9 +77,8 @@ def of_config(config: Config) -> learner.Setup:
 def _check_that_torques_are_left(settings, craft):
     for frameskip in settings.task.frameskips:
         env = AttitudeEnv(frameskip, spacecraft=craft)
-        at_rest = jnp.zeros(observation.SIZE)
-        context = env.context(env.default_params)
-        if np.sum(rate_mask(at_rest, context, settings.network.rate_margin)) <= 1:
+        mask = assurance.rate_mask(env.context(env.default_params), settings.network.rate_margin)
+        if np.sum(mask.allowed(jnp.zeros(3))) <= 1:
             raise UserValueError(
                 f"rate_margin {settings.network.rate_margin:g} masks every torque of {craft} with "
                 f"frameskip {frameskip}, even at rest; weaker torque_levels, smaller frameskips or "

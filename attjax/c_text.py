@@ -1,5 +1,6 @@
 """Numbers, tables and comments as C and C++ read them."""
 
+import dataclasses
 import textwrap
 
 import numpy as np
@@ -64,3 +65,42 @@ def comment(text: str, indent: str = "") -> str:
     first = " " * len(later)
     lines = textwrap.wrap(plain, COMMENT_WIDTH, initial_indent=first, subsequent_indent=later)
     return "\n".join(lines).strip()
+
+
+@dataclasses.dataclass(frozen=True)
+class Expression:
+    """Arithmetic in float32 as C text: what a Python function does to its arguments.
+
+    The order of the operations is kept, so that C rounds as Python would.
+
+    Attributes:
+        text: the expression.
+        binds: 0, a sum; 1, a product; 2, a name.
+
+    Example:
+        >>> a, b = Expression("a"), Expression("b[1]")
+        >>> (-0.5 * (a * b - (b + a))).text
+        '-0.5f * (a * b[1] - (b[1] + a))'
+    """
+
+    text: str
+    binds: int = 2
+
+    def __add__(self, other: "Expression") -> "Expression":
+        """The sum."""
+        return Expression(f"{self.text} + {other._within(1)}", 0)
+
+    def __sub__(self, other: "Expression") -> "Expression":
+        """The difference."""
+        return Expression(f"{self.text} - {other._within(1)}", 0)
+
+    def __mul__(self, other: "Expression") -> "Expression":
+        """The product."""
+        return Expression(f"{self._within(1)} * {other._within(2)}", 1)
+
+    def __rmul__(self, factor: float) -> "Expression":
+        """A number times this."""
+        return Expression(number(factor)) * self
+
+    def _within(self, binds):
+        return self.text if self.binds >= binds else f"({self.text})"

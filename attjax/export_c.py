@@ -4,7 +4,8 @@ from string import Template
 
 import numpy as np
 
-from attjax import c_names, c_text, flight_check, networks, template
+from attjax import c_names, c_text, flight_check, template
+from attjax.export_inputs import FORMS, CInputs
 from attjax.flight_policy import FlightPolicy
 
 POLICY_FILES = ("attjax_policy.h", "attjax_policy.c")
@@ -49,11 +50,10 @@ def _filled(names, prefix, values):
 def constant_bytes(flight: FlightPolicy) -> int:
     """Bytes of the constants in the C source."""
     count = sum(x.weights.size + x.biases.size for x in flight.layers) + flight.torque_table.size
+    count += _inputs(flight).constants
     mask = flight.rate_mask
     if mask is not None:
         count += mask.form.size + mask.impulse.size + mask.own_gain.size + 1
-    if flight.policy.features == "multiscale":
-        count += len(networks.SCALES)
     return 4 * count
 
 
@@ -68,18 +68,15 @@ def operations(flight: FlightPolicy) -> dict[str, int]:
     actions = len(flight.torque_table)
     multiply_adds = sum(x.weights.size for x in flight.layers)
     comparisons = 7 + sum(flight.policy.hidden_sizes) + actions - 1
-    if flight.policy.features == "multiscale":
-        tanh = 6 * len(networks.SCALES)
-        other = tanh + tanh // 2
-    else:
-        tanh, other = 0, 4 * 6
+    inputs = _inputs(flight)
+    other = inputs.other
     if flight.rate_mask is not None:
         multiply_adds += 9 + 3 + 3 * actions
         other += 3 * actions
         comparisons += 2 * actions
     return {
         "multiply_adds": multiply_adds,
-        "tanh": tanh,
+        "tanh": inputs.tanh,
         "comparisons": comparisons,
         "other": other,
     }
@@ -117,29 +114,19 @@ def _kept_rate(flight):
 
 
 def _source_values(flight, prefix):
+    inputs = _inputs(flight)
     return {
         "features": flight.layers[0].weights.shape[0],
         "torque_table": c_text.table(flight.torque_table),
         "weights": "\n".join(_weights(n, x) for n, x in enumerate(flight.layers, 1)),
-        "features_function": _features_function(flight, prefix),
+        "features_function": _fill(inputs.template, prefix, inputs.values),
         "forward": _forward(flight.layers),
         "allow_function": _allow_function(flight, prefix),
     }
 
 
-def _features_function(flight, prefix):
-    if flight.policy.features == "state":
-        return _fill("features_state.c", prefix, {})
-    period, ten = flight.control_period, np.float32(10)
-    values = {
-        "scales": len(networks.SCALES),
-        "scale_values": c_text.table(np.array(networks.SCALES)),
-        "feature_period": networks.FEATURE_PERIOD,
-        "attitude_factor": c_text.number(np.float32(networks.FEATURE_PERIOD) / period),
-        "tenfold_period": c_text.number(ten * period),
-        "log_tenfold_period": c_text.number(np.log(ten * period)),
-    }
-    return _fill("features_multiscale.c", prefix, values)
+def _inputs(flight) -> CInputs:
+    return FORMS[flight.policy.features].c(flight.control_period)
 
 
 def _allow_function(flight, prefix):

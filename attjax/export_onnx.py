@@ -12,6 +12,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 import attjax
 from attjax import c_names, networks
+from attjax.export_inputs import FORMS
 from attjax.flight_policy import FlightPolicy
 
 FILES = ("attjax_policy.onnx",)
@@ -49,7 +50,8 @@ def files(flight: FlightPolicy, seed: int = 0, prefix: str = c_names.PREFIX) -> 
 def model(flight: FlightPolicy) -> onnx.ModelProto:
     """The policy as an ONNX model, checked."""
     graph, actions = Graph(), len(flight.torque_table)
-    logits = _network(graph, flight.layers, _features(graph, flight))
+    features = FORMS[flight.policy.features].onnx(graph, flight.control_period)
+    logits = _network(graph, flight.layers, features)
     if flight.rate_mask is not None:
         masked = graph.constant("masked_logit", np.float32(networks.MASKED_LOGIT))
         logits = graph.add("Where", [_allowed(graph, flight), logits, masked], "masked_logits")
@@ -80,53 +82,6 @@ def _tensor(name, size):
     return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", size])
 
 
-def _features(graph, flight):
-    if flight.policy.features == "state":
-        return _state_features(graph)
-    return _multiscale_features(graph, flight.control_period)
-
-
-def _state_features(graph):
-    """Eq. 11: the quaternion's rate is a sum over the products of all qᵢ and ωⱼ."""
-    shapes = {"column": [0, 4, 1], "row": [0, 1, 3], "products": [0, 12]}
-    shapes = {k: graph.constant(f"{k}_shape", np.array(v, np.int64)) for k, v in shapes.items()}
-    column = graph.add("Reshape", ["quaternion", shapes["column"]], "column")
-    row = graph.add("Reshape", ["angular_velocity", shapes["row"]], "row")
-    outer = graph.add("Mul", [column, row], "outer")
-    products = graph.add("Reshape", [outer, shapes["products"]], "products")
-    kinematics = graph.constant("kinematics", _kinematics().reshape(12, 4))
-    rate = graph.add("MatMul", [products, kinematics], "quaternion_rate")
-    return graph.add("Concat", ["quaternion", rate, "angular_velocity"], "features", axis=1)
-
-
-def _kinematics():
-    """(4, 3, 4) factors of qᵢ ωⱼ in q̇ₖ (Eq. 9)."""
-    factors = np.zeros((4, 3, 4), np.float32)
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        factors[j, k, i], factors[k, j, i] = 0.5, -0.5
-        factors[3, i, i], factors[i, i, 3] = 0.5, -0.5
-    return factors
-
-
-def _multiscale_features(graph, period):
-    """Tanh of the scaled attitude and rate; q_s and two constants of the control period."""
-    scales = np.array(networks.SCALES, np.float32)
-    attitude = np.eye(4, 3, dtype=np.float32) * (np.float32(networks.FEATURE_PERIOD) / period)
-    attitude = graph.constant("attitude_factors", attitude)
-    attitude = graph.add("MatMul", ["quaternion", attitude], "attitude")
-    state = graph.add("Concat", [attitude, "angular_velocity"], "state", axis=1)
-    factors = graph.constant("scale_factors", np.kron(scales, np.eye(6, dtype=np.float32)))
-    scaled = graph.add("Tanh", [graph.add("MatMul", [state, factors], "scaled")], "fine")
-    ten = np.float32(10) * period
-    scalar_part = np.zeros((4, 3), np.float32)
-    scalar_part[3, 0] = 1
-    scalar_part = graph.constant("scalar_part", scalar_part)
-    constants = graph.constant("period", np.array([0, ten, np.log(ten)], np.float32))
-    plain = graph.add("Gemm", ["quaternion", scalar_part, constants], "plain")
-    return graph.add("Concat", [scaled, plain], "features", axis=1)
-
-
 def _network(graph, layers, x):
     for number, layer in enumerate(layers, 1):
         weights = graph.constant(f"weights_{number}", layer.weights)
@@ -138,14 +93,14 @@ def _network(graph, layers, x):
 
 
 def _allowed(graph, flight):
-    """The actions that :class:`attjax.flight_policy.RateMask` allows, (batch, actions)."""
+    """The actions that :class:`attjax.assurance.RateMask` allows, (batch, actions)."""
     mask, rate = flight.rate_mask, "angular_velocity"
     form = graph.constant("peak_rate_form", mask.form)
     twice_impulse = graph.constant("twice_impulse", 2 * mask.impulse.T)
     own_gain = graph.constant("own_gain", mask.own_gain)
     limit = graph.constant("limit_squared", mask.limit_squared)
     zero = graph.constant("zero", np.float32(0))
-    no_torque = graph.constant("no_torque", np.all(flight.torque_table == 0, axis=1))
+    no_torque = graph.constant("no_torque", mask.coasts)
     gradient = graph.add("MatMul", [rate, form], "gradient")
     gain = graph.add("Gemm", [gradient, twice_impulse, own_gain], "gain")
     axis = graph.constant("axis", np.array([1], np.int64))

@@ -8,8 +8,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import networks, provenance
+from attjax import assurance, provenance
 from attjax import observation as observations
+from attjax.assurance import RateMask
 from attjax.context import Context
 from attjax.env import AttitudeEnv
 from attjax.networks import Policy
@@ -22,27 +23,6 @@ class Layer:
 
     weights: np.ndarray
     biases: np.ndarray
-
-
-@dataclasses.dataclass(frozen=True)
-class RateMask:
-    """:func:`attjax.networks.rate_mask` as constants.
-
-    With g = A ω, the square of the peak rate after action a is at most ω·g + gain_a, where
-    gain_a = 2 Δω_a·g + own_gain_a. An action is allowed if that is at most ``limit_squared``,
-    or if gain_a < 0, or if it has no torque.
-
-    Attributes:
-        form: (3, 3) A of :func:`attjax.rigid_body.peak_rate_form`, dimensionless.
-        impulse: (actions, 3) Δω_a, change of the rate by each action, rad/s.
-        own_gain: (actions,) Δω_a·A Δω_a and a bound of what is not of first order, rad²/s².
-        limit_squared: (actions,) rad²/s².
-    """
-
-    form: np.ndarray
-    impulse: np.ndarray
-    own_gain: np.ndarray
-    limit_squared: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -69,7 +49,7 @@ class FlightPolicy:
         arrays = [x for layer in self.layers for x in (layer.weights, layer.biases)]
         if not all(np.all(np.isfinite(x)) for x in arrays):
             raise ValueError("the policy has parameters that are not finite")
-        if np.sum(np.all(self.torque_table == 0, axis=1)) != 1:
+        if np.sum(assurance.coasts(self.torque_table)) != 1:
             raise ValueError("the torque table must have one action without torque")
 
     @functools.cached_property
@@ -97,7 +77,7 @@ class FlightPolicy:
     @property
     def no_torque(self) -> int:
         """The action without torque."""
-        return int(np.flatnonzero(np.all(self.torque_table == 0, axis=1))[0])
+        return int(np.flatnonzero(assurance.coasts(self.torque_table))[0])
 
     @property
     def layers(self) -> list[Layer]:
@@ -112,11 +92,11 @@ class FlightPolicy:
 
     @property
     def rate_mask(self) -> RateMask | None:
-        """The mask, None if the policy has none."""
+        """The mask in float32, as NumPy arrays; None if the policy has none."""
         if self.policy.rate_margin == 0:
             return None
-        constants = networks.rate_mask_constants(self.context, self.policy.rate_margin)
-        return RateMask(*(np.asarray(x, np.float32) for x in constants))
+        mask = assurance.rate_mask(self.context, self.policy.rate_margin)
+        return jax.tree.map(lambda x: np.asarray(x, np.float32), mask)
 
 
 def _layers(params):

@@ -18,8 +18,7 @@ from gymnasium.utils.seeding import np_random
 from gymnasium.wrappers import TimeLimit
 from jax._src.xla_bridge import backends_are_initialized
 
-from attjax import networks
-from attjax import observation as observations
+from attjax import assurance
 from attjax.env import AttitudeEnv
 from attjax.reward import REWARDS, Transition
 from attjax.spacecraft import EnvParams
@@ -204,14 +203,9 @@ def _rendering():
 
 @functools.partial(jax.jit, static_argnames=("env", "margin"))
 def _allowed(env, params, states, margin):
-    context = env.context(params)
-
-    def allowed(quaternion, angular_velocity):
-        observation = observations.observe(quaternion, angular_velocity)
-        return networks.rate_mask(observation, context, margin)
-
-    one = states.quaternion.ndim == 1
-    return (allowed if one else jax.vmap(allowed))(states.quaternion, states.angular_velocity)
+    allowed = assurance.rate_mask(env.context(params), margin).allowed
+    one = states.angular_velocity.ndim == 1
+    return (allowed if one else jax.vmap(allowed))(states.angular_velocity)
 
 
 def starting_key(seed: int):

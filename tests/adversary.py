@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from attjax import EnvState, Spacecraft, dynamics, networks, observation, rigid_body, spacecraft
+from attjax import EnvState, Spacecraft, assurance, dynamics, rigid_body, spacecraft
 from attjax.env import AttitudeEnv
 
 MARGIN = 0.99
@@ -100,8 +100,8 @@ def _fly(env, adversary, params, keys):
     def fly(params, keys):
         def step(state, key):
             wish = functools.partial(_wish, adversary, params, env.context(params))
-            observed = observation.observe(state.quaternion, state.angular_velocity)
-            allowed = networks.rate_mask(observed, env.context(params), MARGIN)
+            mask = assurance.rate_mask(env.context(params), MARGIN)
+            allowed = mask.allowed(state.angular_velocity)
             states = jax.vmap(lambda a: spacecraft.step(state, a, params, env.frameskip))(
                 jnp.arange(len(allowed))
             )

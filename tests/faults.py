@@ -139,8 +139,8 @@ FAULTS = {
         ["test_losses.py"],
     ),
     "multi-scale features without the period": (
-        "networks.py", "10 * control_period, jnp.log(10 * control_period)",
-        "0 * control_period, 0 * control_period", ["test_networks.py"],
+        "features.py", "10 * self.control_period, jnp.log(10 * self.control_period)",
+        "0 * self.control_period, 0 * self.control_period", ["test_features.py"],
     ),
     "rate mask without its second-order remainder": (
         "rigid_body.py", "MOST_TURNING = 0.5**0.5", "MOST_TURNING = 0.0",

@@ -33,7 +33,7 @@ LAYERS = [
     {"dynamics"},
     {"spacecraft", "reward", "observation"},
     {"env"},
-    {"controllers", "gymnax_compat"},
+    {"controllers", "gymnax_compat", "features", "assurance"},
     {"networks", "losses", "rendering"},
     {"learner", "evaluation", "gymnasium_task"},
     {"gymnasium_vector"},

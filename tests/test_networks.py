@@ -2,9 +2,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from bodies import LM50, rotated_inertia
 
-from attjax import AttitudeEnv, dynamics, networks, observation, rigid_body, spacecraft
+from attjax import AttitudeEnv, observation
 from attjax.networks import Inputs, Policy
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
@@ -70,130 +69,6 @@ def test_values_and_masked_probabilities_written_out(x64):
     np.testing.assert_allclose(probabilities, expected.T, atol=1e-15)
     for row, most in enumerate(expected.argmax(axis=1)):
         assert np.asarray(policy.logits(params, inputs))[:, row].argmax() == most
-
-
-def test_multiscale_features_resolve_every_decade():
-    """A change of 1 % at any distance from the goal moves some feature by 1e-3 or more."""
-    for magnitude in 10.0 ** np.arange(-6, 0):
-        a = networks.multiscale_features(observe([magnitude, 0, 0]), CONTEXT)
-        b = networks.multiscale_features(observe([1.01 * magnitude, 0, 0]), CONTEXT)
-        assert a.shape == (57,)
-        assert float(jnp.abs(a - b).max()) > (1e-3 if magnitude > 1e-5 else 1e-4)
-        assert float(jnp.abs(a).max()) <= 3
-
-
-def test_multiscale_features_make_the_last_stretch_the_same_at_every_rate():
-    """Half the period at half the distance: the same ω brings it there in as many actions."""
-    rate = [2e-5, -1e-5, 3e-5]
-    contexts = [CONTEXT.replace(control_period=jnp.array(x)) for x in (0.0875, 0.04375)]
-    slow = networks.multiscale_features(observe(rate, (2e-5, 4e-5, -6e-5, 1.0)), contexts[0])
-    fast = networks.multiscale_features(observe(rate, (1e-5, 2e-5, -3e-5, 1.0)), contexts[1])
-    np.testing.assert_allclose(slow[:-2], fast[:-2], rtol=1e-6)
-
-
-@pytest.mark.parametrize("period", [0.1, 0.025])
-def test_multiscale_features_written_out(x64, period):
-    """tanh(4ⁿ x) scale by scale, then q_s, the period in 0.1 s and its logarithm."""
-    context = CONTEXT.replace(control_period=jnp.array(period))
-    q, w = np.array([0.3, -2e-3, 4e-6, 0.9]), np.array([0.2, -1e-4, 3e-7])
-    x = np.concatenate([q[:3] * 0.05 / period, w])
-    expected = [np.tanh(4.0**n * component) for n in range(9) for component in x]
-    expected += [q[3], period / 0.1, np.log(period / 0.1)]
-    observed = jnp.concatenate([q, np.full(4, 7.0), w])  # q̇ is not looked at
-    np.testing.assert_allclose(networks.multiscale_features(observed, context), expected)
-    wrong = r"observation has shape \(10,\); it must be \(11,\)"
-    with pytest.raises(ValueError, match=wrong):
-        networks.multiscale_features(observed[:10], context)
-
-
-@pytest.mark.parametrize("duration", [1 / 240, 0.1], ids=["pulse", "held"])
-def test_mask_removes_exactly_the_actions_that_lead_beyond_the_limit(x64, duration):
-    """0.45 rad/s by a forecast of first order, 0.475 by an upper bound."""
-    rng = np.random.default_rng(0)
-    context = ENV.context(ENV.default_params).replace(torque_duration=duration)
-    change = np.asarray(context.torque_table) / np.asarray(context.inertia) * duration
-    form = [1, 1, 0.797 * (0.872 + 0.115 - 0.797) / (0.872 * 0.115)]
-    growth = np.sqrt(change**2 @ form)
-    turning = 0.5**0.5 * duration * growth
-    turning = turning * (0.475**2 + 2 / 3 * 0.475 * growth + growth**2 / 6)
-    limited = 0
-    for _ in range(200):
-        w = rng.normal(size=3)
-        w *= rng.uniform(0.40, 0.52) / np.linalg.norm(w)
-        before, after = w**2 @ form, (w + change) ** 2 @ form
-        expected = (after <= 0.45**2) & (after + turning <= 0.475**2)
-        expected |= (after + turning < before) | (np.arange(19) == 0)
-        ours = networks.rate_mask(observe(w), context, 0.9)
-        np.testing.assert_array_equal(ours, expected)
-        limited += not expected.all()
-    assert limited > 50
-
-
-@pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
-@pytest.mark.parametrize("duration", [0.003, 0.5], ids=["below", "beyond the middle"])
-def test_mask_constants_written_out(x64, inertia, duration):
-    """For a spacecraft at rest a weak torque and one that passes the limit at once."""
-    torques = np.array([[0.0, 0, 0], [0.5, 0.2, -0.9], [0, -0.3, 0]])
-    context = CONTEXT.replace(
-        inertia=jnp.asarray(inertia),
-        torque_table=jnp.asarray(torques),
-        torque_duration=duration,
-        rate_limit=jnp.array(0.5),
-    )
-    tensor = np.diag(inertia) if inertia.ndim == 1 else inertia
-    low, _, high = np.sort(LM50)
-    form = ((low + high) * tensor - tensor @ tensor) / (low * high)
-    change = torques @ np.linalg.inv(tensor) * duration
-    growth = np.sqrt(np.einsum("ai,ij,aj->a", change, form, change))
-    turning = np.sqrt(1 / 2) * duration * growth
-    turning = turning * (0.4**2 + 2 / 3 * 0.4 * growth + growth**2 / 6)
-    allowed = np.minimum(0.3**2 + turning, 0.4**2)  # with a margin of 0.6: 0.3, in the middle 0.4
-    ours = networks.rate_mask_constants(context, 0.6)
-    for x, expected in zip(ours, (form, change, growth**2 + turning, allowed), strict=True):
-        np.testing.assert_allclose(x, expected, rtol=1e-12, atol=1e-15)
-
-
-def test_mask_at_its_very_edges(x64):
-    """A sphere at rest, whose rate a torque held for 0.5 s brings to just what the mask keeps."""
-    torques = jnp.array([[0.0, 0, 0], [1.0, 0, 0], [1.0 + 1e-12, 0, 0], [1e-200, 0, 0]])
-    context = CONTEXT.replace(
-        inertia=jnp.ones(3), torque_table=torques, torque_duration=0.5, rate_limit=jnp.array(1.0)
-    )
-    assert networks.rate_mask(observe([0, 0, 0]), context, 0.5).tolist() == [1, 1, 0, 1]
-    # Beyond the limit, a torque that is lost in rounding lowers nothing.
-    assert networks.rate_mask(observe([0, 2, 0]), context, 0.5).tolist() == [1, 0, 0, 0]
-
-
-@pytest.mark.parametrize("frameskip", [0, 5, 20])
-@pytest.mark.parametrize("reckless", [True, False], ids=["fastest", "random"])
-def test_no_policy_under_the_mask_passes_the_limit(frameskip, reckless):
-    """64 spacecraft that spin up as far as the mask lets them, or act at random."""
-    env, margin = AttitudeEnv(frameskip), 0.99
-    params = env.default_params
-    context = env.context(params)
-
-    def step(state, key):
-        observed = observation.observe(state.quaternion, state.angular_velocity)
-        allowed = networks.rate_mask(observed, context, margin)
-        wish = jax.random.uniform(key, (19,))
-        if reckless:
-            after = dynamics.rate_after_impulse(
-                state.angular_velocity, context.torque_table, context.inertia
-            )
-            wish = rigid_body.peak_rate(after, context.inertia) + 1e-3 * wish
-        state = spacecraft.step(
-            state, jnp.argmax(jnp.where(allowed, wish, -1.0)), params, frameskip
-        )
-        return state, jnp.sqrt(jnp.sum(state.angular_velocity**2))
-
-    def highest_rate(key):
-        start = spacecraft.initial_state(key, params)
-        return jnp.max(jax.lax.scan(step, start, jax.random.split(key, 1750))[1])
-
-    rates = jax.jit(jax.vmap(highest_rate))(jax.random.split(jax.random.key(1), 64))
-    assert rates.max() <= margin * params.rate_limit * (1 + 1e-5)
-    if reckless:
-        assert rates.max() > 0.985 * params.rate_limit
 
 
 def batch_of_one(inputs):

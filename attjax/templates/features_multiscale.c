@@ -16,6 +16,5 @@ static void features_of(const float q[4], const float w[3], float features[FEATU
         }
     }
     features[6 * SCALES] = q[3];
-    features[6 * SCALES + 1] = $tenfold_period;
-    features[6 * SCALES + 2] = $log_tenfold_period;
+$period
 }

@@ -4,10 +4,7 @@ static void features_of(const float q[4], const float w[3], float features[FEATU
     for (int i = 0; i < 4; i++) {
         features[i] = q[i];
     }
-    features[4] = 0.5f * (w[2] * q[1] - w[1] * q[2] + w[0] * q[3]);
-    features[5] = 0.5f * (w[0] * q[2] - w[2] * q[0] + w[1] * q[3]);
-    features[6] = 0.5f * (w[1] * q[0] - w[0] * q[1] + w[2] * q[3]);
-    features[7] = -0.5f * (w[0] * q[0] + w[1] * q[1] + w[2] * q[2]);
+$quaternion_rate
     for (int i = 0; i < 3; i++) {
         features[8 + i] = w[i];
     }

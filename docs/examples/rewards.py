@@ -2,7 +2,7 @@
 
 import jax.numpy as jnp
 
-from attjax import networks, reward
+from attjax import features, reward
 
 PRICE = 2e4
 """What an N m s costs; in the logarithmic reward, a decade of pointing earns 40 in a second."""
@@ -19,4 +19,4 @@ def with_momentum(observation, context):
     angular_velocity = observation[8:11]
     largest = jnp.max(context.inertia) * context.rate_limit
     momentum = context.inertia * angular_velocity / largest
-    return jnp.concatenate([networks.multiscale_features(observation, context), momentum])
+    return jnp.concatenate([features.multiscale_features(observation, context), momentum])

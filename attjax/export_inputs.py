@@ -1,0 +1,115 @@
+"""The network inputs that C and ONNX know: how each of attjax.features.FEATURES is written down.
+
+All numbers are those of :mod:`attjax.features` and :mod:`attjax.quaternion`; here is only how the
+formats spell them.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from attjax import c_text, features
+from attjax import quaternion as quaternions
+from attjax.c_text import Expression
+from attjax.features import Multiscale
+
+
+class CInputs(NamedTuple):
+    """Inputs in C.
+
+    Attributes:
+        template: the file that computes them.
+        values: what fills it in.
+        constants: how many numbers its arrays have.
+        tanh, other: how many operations of a decision it takes.
+    """
+
+    template: str
+    values: dict[str, str | int | float]
+    constants: int
+    tanh: int
+    other: int
+
+
+class Form(NamedTuple):
+    """How inputs are written down for one control period, a float32 in s.
+
+    Attributes:
+        c: (period) to CInputs.
+        onnx: (graph, period) to the name of the features among the graph's nodes.
+    """
+
+    c: Callable[[np.float32], CInputs]
+    onnx: Callable[..., str]
+
+
+def _state_in_c(period):
+    """Eq. 9 by the very operations of quaternion.derivative."""
+    del period
+    quaternion = [Expression(f"q[{i}]") for i in range(4)]
+    rate = quaternions.derivative(quaternion, [Expression(f"w[{i}]") for i in range(3)])
+    lines = [f"    features[{i}] = {x.text};" for i, x in enumerate(rate, 4)]
+    values = {"quaternion_rate": "\n".join(lines)}
+    return CInputs("features_state.c", values, constants=0, tanh=0, other=4 * 6)
+
+
+def _state_in_onnx(graph, period):
+    """Eq. 11: the quaternion's rate is a sum over the products of all qᵢ and ωⱼ."""
+    del period
+    shapes = {"column": [0, 4, 1], "row": [0, 1, 3], "products": [0, 12]}
+    shapes = {k: graph.constant(f"{k}_shape", np.array(v, np.int64)) for k, v in shapes.items()}
+    column = graph.add("Reshape", ["quaternion", shapes["column"]], "column")
+    row = graph.add("Reshape", ["angular_velocity", shapes["row"]], "row")
+    outer = graph.add("Mul", [column, row], "outer")
+    products = graph.add("Reshape", [outer, shapes["products"]], "products")
+    kinematics = graph.constant("kinematics", _kinematics().reshape(12, 4))
+    rate = graph.add("MatMul", [products, kinematics], "quaternion_rate")
+    return graph.add("Concat", ["quaternion", rate, "angular_velocity"], "features", axis=1)
+
+
+def _kinematics():
+    """(4, 3, 4) factors of qᵢ ωⱼ in q̇ₖ: what quaternion.derivative makes of unit vectors."""
+    rates = [[quaternions.derivative(q, w) for w in np.eye(3)] for q in np.eye(4)]
+    return np.array(rates) + 0.0  # no negative zeros
+
+
+def _multiscale_in_c(period):
+    numbers = Multiscale(period)
+    count, tanh = len(numbers.scales), numbers.factors.shape[1]
+    lines = [
+        f"    features[6 * SCALES + {i}] = {c_text.number(x)};"
+        for i, x in enumerate(numbers.period, 1)
+    ]
+    values = {
+        "scales": count,
+        "scale_values": c_text.table(numbers.scales),
+        "feature_period": features.FEATURE_PERIOD,
+        "attitude_factor": c_text.number(numbers.attitude_factor),
+        "period": "\n".join(lines),
+    }
+    return CInputs("features_multiscale.c", values, count, tanh, other=tanh + tanh // 2)
+
+
+def _multiscale_in_onnx(graph, period):
+    """Tanh of the scaled attitude and rate; q_s and the constants of the control period."""
+    numbers = Multiscale(period)
+    attitude = graph.constant("attitude_factors", np.eye(4, 3) * numbers.attitude_factor)
+    attitude = graph.add("MatMul", ["quaternion", attitude], "attitude")
+    state = graph.add("Concat", [attitude, "angular_velocity"], "state", axis=1)
+    factors = graph.constant("scale_factors", numbers.factors)
+    scaled = graph.add("Tanh", [graph.add("MatMul", [state, factors], "scaled")], "fine")
+    constants = np.array([0, *numbers.period])
+    scalar_part = np.zeros((4, len(constants)))
+    scalar_part[3, 0] = 1
+    scalar_part = graph.constant("scalar_part", scalar_part)
+    constants = graph.constant("period", constants)
+    plain = graph.add("Gemm", ["quaternion", scalar_part, constants], "plain")
+    return graph.add("Concat", [scaled, plain], "features", axis=1)
+
+
+FORMS = {
+    "state": Form(_state_in_c, _state_in_onnx),
+    "multiscale": Form(_multiscale_in_c, _multiscale_in_onnx),
+}
+"""By name; a policy with other inputs is exported as StableHLO alone, which JAX writes."""
