@@ -27,16 +27,16 @@ __all__ = [
 __version__ = "0.1.0"
 
 _MODULES = {
-    "AttitudeEnv": "env",
-    "EnvParams": "spacecraft",
-    "EnvState": "spacecraft",
-    "LM50": "specification",
-    "Spacecraft": "specification",
-    "evaluate": "evaluation",
-    "load_policy": "checkpoint",
-    "open_loop": "vector",
-    "step": "spacecraft",
-    "train": "training",
+    "AttitudeEnv": "attjax.env",
+    "EnvParams": "attjax.spacecraft",
+    "EnvState": "attjax.spacecraft",
+    "LM50": "attjax.specification",
+    "Spacecraft": "attjax.specification",
+    "evaluate": "attjax.evaluation",
+    "load_policy": "attjax.checkpoint",
+    "open_loop": "attjax.vector",
+    "step": "attjax.spacecraft",
+    "train": "attjax.training",
 }
 
 
@@ -44,7 +44,7 @@ def __getattr__(name: str) -> Any:
     """Import at first use: JAX takes seconds, which ``train.py --help`` need not."""
     if name not in _MODULES:
         raise AttributeError(f"module 'attjax' has no attribute {name!r}")
-    return getattr(importlib.import_module(f"attjax.{_MODULES[name]}"), name)
+    return getattr(importlib.import_module(_MODULES[name]), name)
 
 
 def __dir__() -> list[str]:

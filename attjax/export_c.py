@@ -8,6 +8,7 @@ from attjax import c_names, c_text, flight_check, template
 from attjax.export_inputs import FORMS, CInputs
 from attjax.flight_policy import FlightPolicy
 
+TEMPLATES = "export/templates"
 POLICY_FILES = ("attjax_policy.h", "attjax_policy.c")
 TEST_FILES = ("attjax_vectors.h", "attjax_test.c")
 FILES = POLICY_FILES + TEST_FILES
@@ -210,5 +211,5 @@ def _numbers(values):
 
 def _fill(name, prefix, values):
     """A template with these values; the template's own names, no user's, get the prefix."""
-    text = c_names.renamed(template.read(name), prefix)
+    text = c_names.renamed(template.read(f"{TEMPLATES}/{name}"), prefix)
     return Template(text).substitute(values)

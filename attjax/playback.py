@@ -19,6 +19,7 @@ RANDOM_SLEWS = 4
 MAX_STEPS = 20_000
 """Agent steps of a slew; a page of that many has 15 MB."""
 
+TEMPLATES = "evaluation/playback"
 SCRIPTS = ("scene", "draw", "curves", "player", "controls")
 
 
@@ -62,11 +63,11 @@ def page(
         "slews": _slew_names(start),
         "flights": [[_encoded(one) for one in slew] for slew in zip(*histories)],
     }
-    scripts = "\n".join(template.read(f"playback_{name}.js") for name in SCRIPTS)
+    scripts = "\n".join(template.read(f"{TEMPLATES}/{name}.js") for name in SCRIPTS)
     # "<" would let a name end the element that holds it.
     flights = json.dumps(content).replace("<", "\\u003c")
-    style = template.read("playback.css")
-    return template.fill("playback.html", style=style, script=scripts, flights=flights)
+    style = template.read(f"{TEMPLATES}/page.css")
+    return template.fill(f"{TEMPLATES}/page.html", style=style, script=scripts, flights=flights)
 
 
 def _starts(env, params, key) -> EnvState:

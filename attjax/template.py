@@ -1,14 +1,18 @@
-"""The text files in attjax/templates that are filled in for the user."""
+"""The text files of the package that are filled in for the user."""
 
 from importlib import resources
 from string import Template
 
 
-def read(name: str) -> str:
-    """A template as it is."""
-    return resources.files("attjax").joinpath("templates", name).read_text(encoding="utf-8")
+def read(path: str) -> str:
+    """A template as it is.
+
+    Args:
+        path: of the file, from the package's folder, with slashes.
+    """
+    return resources.files("attjax").joinpath(*path.split("/")).read_text(encoding="utf-8")
 
 
-def fill(name: str, **values) -> str:
+def fill(path: str, **values: str) -> str:
     """A template with its ``$names`` replaced."""
-    return Template(read(name)).substitute(values)
+    return Template(read(path)).substitute(values)

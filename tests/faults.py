@@ -1,164 +1,164 @@
 """Deliberate faults that no rule of mutants.py makes, each with the tests that should see it."""
 
 PHYSICS = [
-    "test_truth.py",
-    "test_dynamics.py",
-    "test_quaternion.py",
-    "test_env.py",
+    "tests/test_truth.py",
+    "tests/test_dynamics.py",
+    "tests/test_quaternion.py",
+    "tests/test_env.py",
 ]
 LEARNING = [
-    "test_ppo.py",
-    "test_rollout.py",
-    "test_losses.py",
-    "test_vector.py",
+    "tests/test_ppo.py",
+    "tests/test_rollout.py",
+    "tests/test_losses.py",
+    "tests/test_vector.py",
 ]
-DESCENT = ["test_descent.py", "test_losses.py", "test_rollout.py"]
+DESCENT = ["tests/test_descent.py", "tests/test_losses.py", "tests/test_rollout.py"]
 RUNS = [
-    "test_checkpoint.py",
-    "test_run_folder.py",
-    "test_metrics.py",
-    "test_cli.py",
+    "tests/test_checkpoint.py",
+    "tests/test_run_folder.py",
+    "tests/test_metrics.py",
+    "tests/test_cli.py",
 ]
 FAULTS = {
     "sign of the gyroscopic term": (
-        "equations.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
+        "attjax/equations.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
         "((i3 - i2) / i1, (i1 - i3) / i2, (i2 - i1) / i3)", PHYSICS,
     ),
     "gyroscopic term of a full tensor without its symmetric part": (
-        "equations.py", "factors = factors + factors.swapaxes(1, 2)", "factors = 2 * factors",
+        "attjax/equations.py", "factors = factors + factors.swapaxes(1, 2)", "factors = 2 * factors",
         PHYSICS,
     ),
     "missing ½ in the kinematics": (
-        "quaternion.py", "0.5 * (w3 * q2 - w2 * q3 + w1 * qs)", "(w3 * q2 - w2 * q3 + w1 * qs)",
+        "attjax/quaternion.py", "0.5 * (w3 * q2 - w2 * q3 + w1 * qs)", "(w3 * q2 - w2 * q3 + w1 * qs)",
         PHYSICS,
     ),
     "wrong order in RK4": (
-        "dynamics.py", "k3 = equations.rate(advance(dt / 2, k2))",
+        "attjax/dynamics.py", "k3 = equations.rate(advance(dt / 2, k2))",
         "k3 = equations.rate(advance(dt / 2, k1))", PHYSICS,
     ),
     "skipped normalisation": (
-        "dynamics.py", "return quaternions.normalize(quaternion)", "return (quaternion)", PHYSICS,
+        "attjax/dynamics.py", "return quaternions.normalize(quaternion)", "return (quaternion)", PHYSICS,
     ),
     "one coasting step too many": (
-        "dynamics.py", "jnp.arange(agent_step.frameskip,", "jnp.arange(agent_step.frameskip + 1,",
+        "attjax/dynamics.py", "jnp.arange(agent_step.frameskip,", "jnp.arange(agent_step.frameskip + 1,",
         PHYSICS,
     ),
     "torque twice as strong": (
-        "dynamics.py", "change = call(_first_step, start, equations)",
+        "attjax/dynamics.py", "change = call(_first_step, start, equations)",
         "change = call(_first_step, start, equations._replace("
         "torque=add(equations.torque, equations.torque)))", PHYSICS,
     ),
     "terminal reward added, not replacing": (
-        "reward.py", "jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
+        "attjax/reward.py", "jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
         "reward + jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
-        ["test_reward.py", "test_env.py"],
+        ["tests/test_reward.py", "tests/test_env.py"],
     ),
     "time limit before overspeed": (
-        "env.py", "truncated = ~terminated & (next_state.time", "truncated = (next_state.time",
-        ["test_env.py"],
+        "attjax/env.py", "truncated = ~terminated & (next_state.time", "truncated = (next_state.time",
+        ["tests/test_env.py"],
     ),
     "GAE bootstraps over a termination": (
-        "losses.py", "jnp.where(terminated, 0.0, next_values)", "next_values", ["test_losses.py"],
+        "attjax/losses.py", "jnp.where(terminated, 0.0, next_values)", "next_values", ["tests/test_losses.py"],
     ),
     "GAE runs over the end of an episode": (
-        "losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)",
-        ["test_losses.py"],
+        "attjax/losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)",
+        ["tests/test_losses.py"],
     ),
     "clipped objective without the pessimistic bound": (
-        "losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", ["test_losses.py"],
+        "attjax/losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", ["tests/test_losses.py"],
     ),
     "annealing off by one": (
-        "learner.py", "settings.final_learning_rate, settings.gradient_steps",
+        "attjax/learner.py", "settings.final_learning_rate, settings.gradient_steps",
         "settings.final_learning_rate, settings.gradient_steps - settings.minibatches", LEARNING,
     ),
     "key reused from update to update": (
-        "rollout.py", "return learner.replace(key=key), steps", "return learner, steps", LEARNING,
+        "attjax/rollout.py", "return learner.replace(key=key), steps", "return learner, steps", LEARNING,
     ),
     "same key for all steps of a rollout": (
-        "rollout.py", "random = (uniform, jax.random.split(flight_key, (length, 2)))",
+        "attjax/rollout.py", "random = (uniform, jax.random.split(flight_key, (length, 2)))",
         "random = (0 * uniform + uniform[0], jax.random.split(flight_key, (length, 2)))", LEARNING,
     ),
     "reset state cached": (
-        "env.py", "fresh_observation, fresh_state = self.reset_env(key, params)",
+        "attjax/env.py", "fresh_observation, fresh_state = self.reset_env(key, params)",
         "fresh_observation, fresh_state = self.reset_env(jax.random.key(0), params)",
-        ["test_env.py"],
+        ["tests/test_env.py"],
     ),
     "reset state cached in the fused rollout": (
-        "vector.py", "fresh = jax.vmap(reset)(jax.random.split(fresh_key, portion), rows)",
+        "attjax/vector.py", "fresh = jax.vmap(reset)(jax.random.split(fresh_key, portion), rows)",
         "fresh = jax.vmap(reset)(jax.random.split(jax.random.key(0), portion), rows)", LEARNING,
     ),
     "devices draw the same numbers": (
-        "rollout.py", "jax.random.fold_in(device_key, jax.lax.axis_index(sharding.AXIS))",
+        "attjax/rollout.py", "jax.random.fold_in(device_key, jax.lax.axis_index(sharding.AXIS))",
         "jax.random.fold_in(device_key, 0)", LEARNING,
     ),
     "closest angle is the last": (
-        "evaluation.py", "closest_angle=jnp.where(closer, angle, so_far.closest_angle)",
-        "closest_angle=angle", ["test_evaluation.py"],
+        "attjax/evaluation.py", "closest_angle=jnp.where(closer, angle, so_far.closest_angle)",
+        "closest_angle=angle", ["tests/test_evaluation.py"],
     ),
     "closest rate is the last": (
-        "evaluation.py", "closest_rate=jnp.where(closer, rate, so_far.closest_rate)",
-        "closest_rate=rate", ["test_evaluation.py"],
+        "attjax/evaluation.py", "closest_rate=jnp.where(closer, rate, so_far.closest_rate)",
+        "closest_rate=rate", ["tests/test_evaluation.py"],
     ),
     "impulse of a held torque is that of a pulse, in evaluation": (
-        "evaluation.py", "context.torque_duration", "(1 / 240)", ["test_evaluation.py"],
+        "attjax/evaluation.py", "context.torque_duration", "(1 / 240)", ["tests/test_evaluation.py"],
     ),
     "impulse of a held torque is that of a pulse, for a reward": (
-        "env.py", "self.context(params).torque_duration,", "INTEGRATION_STEP,",
-        ["test_env.py"],
+        "attjax/env.py", "self.context(params).torque_duration,", "INTEGRATION_STEP,",
+        ["tests/test_env.py"],
     ),
     "sign in TABLE_5": (
         "evaluation.py", '"slew2": (0.44228, -0.44228', '"slew2": (0.44228, 0.44228',
-        ["test_slew_references.py"],
+        ["tests/test_slew_references.py"],
     ),
     "factor of the time-optimal reference": (
-        "evaluation.py", "return 2 * numerics.square_root(jnp.sum(momentum)",
-        "return 3 * numerics.square_root(jnp.sum(momentum)", ["test_slew_references.py"],
+        "attjax/evaluation.py", "return 2 * numerics.square_root(jnp.sum(momentum)",
+        "return 3 * numerics.square_root(jnp.sum(momentum)", ["tests/test_slew_references.py"],
     ),
     "reward_scale ignored": (
-        "rollout.py", "*= setup.settings.task.reward_scale", "*= 1.0", ["test_rollout.py"],
+        "attjax/rollout.py", "*= setup.settings.task.reward_scale", "*= 1.0", ["tests/test_rollout.py"],
     ),
     "max_gradient_norm ignored": (
-        "learner.py", "if settings.max_gradient_norm > 0:", "if False:", DESCENT,
+        "attjax/learner.py", "if settings.max_gradient_norm > 0:", "if False:", DESCENT,
     ),
     "normalize_advantage ignored: always": (
-        "descent.py", "if settings.normalize_advantage:", "if True:", DESCENT,
+        "attjax/descent.py", "if settings.normalize_advantage:", "if True:", DESCENT,
     ),
     "normalize_advantage ignored: never": (
-        "descent.py", "if settings.normalize_advantage:", "if False:", DESCENT,
+        "attjax/descent.py", "if settings.normalize_advantage:", "if False:", DESCENT,
     ),
     "same shuffle in each pass": (
-        "descent.py", "jax.random.split(pass_key, settings.passes)",
+        "attjax/descent.py", "jax.random.split(pass_key, settings.passes)",
         "jnp.stack([pass_key] * settings.passes)", DESCENT,
     ),
     "same shuffle on each device": (
-        "descent.py", "jax.random.fold_in(pass_key, jax.lax.axis_index(AXIS))",
+        "attjax/descent.py", "jax.random.fold_in(pass_key, jax.lax.axis_index(AXIS))",
         "jax.random.fold_in(pass_key, 0)", DESCENT,
     ),
     "approximate KL without its ratio": (
-        "losses.py", "jnp.mean(ratio - 1 - log_ratio)", "jnp.mean(-log_ratio)",
-        ["test_losses.py"],
+        "attjax/losses.py", "jnp.mean(ratio - 1 - log_ratio)", "jnp.mean(-log_ratio)",
+        ["tests/test_losses.py"],
     ),
     "multi-scale features without the period": (
-        "features.py", "10 * self.control_period, jnp.log(10 * self.control_period)",
-        "0 * self.control_period, 0 * self.control_period", ["test_features.py"],
+        "attjax/features.py", "10 * self.control_period, jnp.log(10 * self.control_period)",
+        "0 * self.control_period, 0 * self.control_period", ["tests/test_features.py"],
     ),
     "rate mask without its second-order remainder": (
-        "rigid_body.py", "MOST_TURNING = 0.5**0.5", "MOST_TURNING = 0.0",
-        ["test_rate_limit.py"],
+        "attjax/rigid_body.py", "MOST_TURNING = 0.5**0.5", "MOST_TURNING = 0.0",
+        ["tests/test_rate_limit.py"],
     ),
     "observation bound without coasting": (
-        "env.py", "(params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))",
-        "(params.rate_limit + kick)", ["test_observation_space.py"],
+        "attjax/env.py", "(params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))",
+        "(params.rate_limit + kick)", ["tests/test_observation_space.py"],
     ),
     "optimizer not restored": (
-        "checkpoint.py", "    return restored.replace(key=",
+        "attjax/checkpoint.py", "    return restored.replace(key=",
         "    return restored.replace(optimizer=template.optimizer, key=", RUNS,
     ),
     "rows after the checkpoint kept": (
         "metrics_file.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
     ),
     "no lock on the folder": (
-        "run_folder.py", "fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,
+        "attjax/run_folder.py", "fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,
     ),
 }  # fmt: skip
 """By name: module, code, what it becomes, tests that should catch it."""

@@ -131,7 +131,7 @@ def main(argv=None) -> int:
 def check_tests(mutants) -> None:
     """End the program if the tests fail on the code as it is, since they would on any change."""
     for module, tests in {x.module: x.tests for x in mutants}.items():
-        text = (ROOT / f"attjax/{module}.py").read_text()
+        text = (ROOT / module).read_text()
         unchanged = Mutant(module, "", text, "", "", tests)
         for _, outcome, failed in run([unchanged], 1):
             if outcome != "survived":
@@ -148,7 +148,7 @@ def is_equivalent(mutant) -> bool:
     return any(
         mutant.becomes.count(x["becomes"]) == 1
         and mutant.becomes.replace(x["becomes"], x["line"]) == mutant.line
-        for x in EQUIVALENT.get(mutant.module, [])
+        for x in EQUIVALENT.get(Path(mutant.module).stem, [])
     )
 
 
@@ -156,26 +156,25 @@ def faults() -> list[Mutant]:
     """The changes of faults.py."""
     found = []
     for name, (module, code, broken, tests) in FAULTS.items():
-        text = (ROOT / "attjax" / module).read_text()
+        text = (ROOT / module).read_text()
         assert text.count(code) == 1, f"{code!r} is {text.count(code)} times in {module}"
         text = text.replace(code, broken)
-        tests = [f"tests/{test}" for test in tests]
-        found.append(Mutant(module.removesuffix(".py"), name, text, name, broken, tests))
+        found.append(Mutant(module, name, text, name, broken, tests))
     return found
 
 
 def changes(module) -> list[Mutant]:
     """What the operators make of a module; each changed text once."""
-    text = (ROOT / f"attjax/{module}.py").read_text()
+    tests = TESTS[module]
+    path = tests[0]
+    text = (ROOT / path).read_text()
     operators = {name: cosmic_ray.plugins.get_operator(f"core/{name}")() for name in OPERATORS}
     found = {}
     for name, operator in (operators | {"SwapNames": SwapNames()}).items():
         occurrence = 0
         while (changed := mutate_code(text, operator, occurrence)) is not None:
             removed, added = difference(text, changed)
-            found[changed] = Mutant(
-                module, f"{name}-{occurrence}", changed, removed, added, TESTS[module]
-            )
+            found[changed] = Mutant(path, f"{name}-{occurrence}", changed, removed, added, tests)
             occurrence += 1
     return list(found.values())
 
@@ -206,7 +205,7 @@ def run(mutants, jobs):
         while waiting or running:
             while waiting and copies:
                 copy, mutant = copies.pop(), waiting.popleft()
-                path = copy / f"attjax/{mutant.module}.py"
+                path = copy / mutant.module
                 original = path.read_text()
                 path.write_text(mutant.source)
                 running[start(copy, mutant.tests)] = copy, mutant, path, original

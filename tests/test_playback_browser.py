@@ -115,7 +115,7 @@ def test_settling_times_are_those_of_the_evaluation(browser):
 def test_a_click_or_a_drag_on_the_curves_scrubs(browser):
     actions = webdriver.ActionChains(browser)
     for curves in browser.find_elements("css selector", ".curves"):
-        width = curves.size["width"] - 52 - 42  # the margins of playback_curves.js
+        width = curves.size["width"] - 52 - 42  # the margins of curves.js
         for share in (0.5, 0.2):
             across = round(52 + share * width - curves.size["width"] / 2)
             actions.move_to_element_with_offset(curves, across, -60).click().perform()

@@ -7,8 +7,12 @@ from collections.abc import Sequence
 
 from attjax import c_names, cli, destinations, devices, errors, run_config, run_folder
 
-FORMATS = {"c": "export_c", "onnx": "export_onnx", "stablehlo": "export_stablehlo"}
-NEEDED = {"export_onnx": "onnx", "export_stablehlo": "flatbuffers"}
+FORMATS = {
+    "c": "attjax.export_c",
+    "onnx": "attjax.export_onnx",
+    "stablehlo": "attjax.export_stablehlo",
+}
+NEEDED = {"onnx": "onnx", "stablehlo": "flatbuffers"}
 USAGE = "%(prog)s --format FORMAT --out FOLDER [--checkpoint FOLDER] [FLAG ...]"
 EXAMPLES = """\
 examples:
@@ -61,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parse_arguments(argv)
     with errors.one_line_errors():
         devices.select_device(arguments.device)
-        module = _module(FORMATS[arguments.format])
+        module = _module(arguments.format)
         flight = _flight_policy(arguments)
         names = [c_names.renamed(name, arguments.prefix) for name in module.FILES]
         _prepare(arguments.out, names, arguments.overwrite)
@@ -78,7 +82,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _module(name):
     try:
-        return importlib.import_module("attjax." + name)
+        return importlib.import_module(FORMATS[name])
     except ModuleNotFoundError as error:
         if error.name != NEEDED.get(name):
             raise
