@@ -23,7 +23,7 @@ class Context:
     inertia: chex.Array
     torque_table: chex.Array
     rate_limit: chex.Array
-    torque_duration: chex.Array = INTEGRATION_STEP
+    torque_duration: chex.Numeric = INTEGRATION_STEP
 
     @property
     def largest_torque(self) -> chex.Array:

@@ -4,6 +4,8 @@
 action whose impulse comes nearest to the one that leads there.
 """
 
+from collections.abc import Callable
+
 import chex
 import jax.numpy as jnp
 
@@ -68,7 +70,9 @@ def average_torque(context: Context) -> chex.Array:
     return context.largest_torque * context.torque_duration / context.control_period
 
 
-def nearest_action(wanted_rate, observation, context: Context) -> chex.Array:
+def nearest_action(
+    wanted_rate: chex.Array, observation: chex.Array, context: Context
+) -> chex.Array:
     """The action whose impulse is nearest to I (wanted rate − ω), for a (3,) wanted rate.
 
     The wanted rate is first scaled back to within the rate limit's margin.
@@ -81,5 +85,8 @@ def nearest_action(wanted_rate, observation, context: Context) -> chex.Array:
     return jnp.argmin(jnp.sum(missing**2, axis=-1))
 
 
-CONTROLLERS = {"phase-plane": phase_plane, "feedback": quaternion_feedback}
+CONTROLLERS: dict[str, Callable[[chex.Array, Context], chex.Array]] = {
+    "phase-plane": phase_plane,
+    "feedback": quaternion_feedback,
+}
 """Controllers by the names that ``eval.py --controller`` knows."""

@@ -35,16 +35,16 @@ def one_loop(function: Callable[..., Tree], *operands: Any) -> Tree:
         (4.0, 2.0)
     """
     leaves, structure = jax.tree.flatten(operands)
+    shapes = jax.eval_shape(function, *operands)
+    arguments, outputs = len(leaves), len(jax.tree.leaves(shapes))
     scalars = [jnp.asarray(x) for x in leaves]
-    result = jax.tree.structure(jax.eval_shape(function, *operands))
-    arguments, outputs = len(scalars), result.num_leaves
     scalars += scalars[:1] * (outputs - arguments)
 
     def reducer(_, current):
-        values = function(*structure.unflatten(current[:arguments]))
+        values = function(*jax.tree.unflatten(structure, current[:arguments]))
         return (*jax.tree.leaves(values), *current[outputs:])
 
     copies = [jnp.broadcast_to(x, (2,)) for x in scalars]
     zeros = [jnp.zeros((), x.dtype) for x in scalars]
     reduced = jax.lax.reduce(tuple(copies), tuple(zeros), reducer, (0,))
-    return result.unflatten(reduced[:outputs])
+    return jax.tree.unflatten(jax.tree.structure(shapes), reduced[:outputs])

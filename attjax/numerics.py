@@ -19,7 +19,7 @@ def square_root(x: chex.Array) -> chex.Array:
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, x, 1)), 0)
 
 
-def add(total: tuple, x: chex.Array) -> tuple:
+def add(total: tuple[chex.Array, chex.Array], x: chex.Array) -> tuple[chex.Array, chex.Array]:
     """Add x to a compensated sum (Kahan's).
 
     Args:

@@ -3,14 +3,20 @@
 The error quaternion relates the body frame to the desired frame; the goal is ``[0, 0, 0, 1]``.
 """
 
+from collections.abc import Sequence
+from typing import TypeAlias
+
 import chex
 import jax.numpy as jnp
 
 from attjax import checks
 from attjax.numerics import square_root
 
+Components: TypeAlias = chex.Array | Sequence[chex.Numeric]
+"""An array, or its entries one by one."""
 
-def from_axis_angle(axis: chex.Array, angle: chex.Array) -> chex.Array:
+
+def from_axis_angle(axis: chex.Array, angle: chex.Numeric) -> chex.Array:
     """Quaternion of a rotation (Eq. 8).
 
     Args:
@@ -33,7 +39,9 @@ def normalize(quaternion: chex.Array) -> chex.Array:
     return quaternion / jnp.sqrt(jnp.sum(quaternion**2))
 
 
-def derivative(quaternion, angular_velocity):
+def derivative(
+    quaternion: Components, angular_velocity: Components
+) -> tuple[chex.Array, chex.Array, chex.Array, chex.Array]:
     """Kinematics, q̇ = ½ Ω(ω) q (Eq. 9 and 10), by components.
 
     Args:

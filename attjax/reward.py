@@ -4,6 +4,7 @@ To bring your own, pass any function of this signature to ``AttitudeEnv(reward=.
 in ``train.py --reward module:function``.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import chex
@@ -97,5 +98,8 @@ def logarithmic_reward(transition: Transition) -> chex.Array:
     return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
 
 
-REWARDS = {"paper": paper_reward, "logarithmic": logarithmic_reward}
+REWARDS: dict[str, Callable[[Transition], chex.Array]] = {
+    "paper": paper_reward,
+    "logarithmic": logarithmic_reward,
+}
 """Rewards by the names that settings and ``gymnasium.make`` know."""

@@ -1,32 +1,33 @@
 """What a spacecraft's inertia alone says of its motion."""
 
+import chex
 import jax.numpy as jnp
 
 from attjax import checks
 from attjax.numerics import square_root
 
 
-def inverse(inertia):
+def inverse(inertia: chex.Array) -> chex.Array:
     """Inverse of a symmetric 3x3 matrix, by the cross products of its rows."""
     a, b, c = inertia
     adjugate = jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
     return adjugate / jnp.sum(a * adjugate[0])
 
 
-def angular_momentum(inertia, angular_velocity):
+def angular_momentum(inertia: chex.Array, angular_velocity: chex.Array) -> chex.Array:
     """I ω, N m s, for an inertia (3,) or (3, 3) and (..., 3) angular velocities."""
     if inertia.ndim == 1:
         return inertia * angular_velocity
     return jnp.matmul(angular_velocity, inertia, precision="highest")
 
 
-def principal_moments(inertia):
+def principal_moments(inertia: chex.Array) -> chex.Array:
     """(3,) principal moments, kg m², of an inertia (3,) or (3, 3)."""
     inertia = checks.inertia(inertia)
     return inertia if inertia.ndim == 1 else jnp.linalg.eigvalsh(inertia)
 
 
-def peak_rate(angular_velocity, inertia):
+def peak_rate(angular_velocity: chex.Array, inertia: chex.Array) -> chex.Array:
     """Largest ‖ω‖ that the spacecraft comes to while it coasts on without torque.
 
     Coasting conserves 2T = ω·Iω and H = ‖Iω‖. In the principal axes, each
@@ -55,7 +56,7 @@ MOST_TURNING = 0.5**0.5
 """Of any body, ‖I⁻¹(ω × Iω)‖ ≤ √½ ‖ω‖² in the norm of :func:`peak_rate_form`."""
 
 
-def peak_rate_form(inertia):
+def peak_rate_form(inertia: chex.Array) -> chex.Array:
     """(3, 3) matrix A, dimensionless, of an inertia (3,) or (3, 3): peak rate² = ω·Aω.
 
     In the principal axes it is 1 for the least and the largest moment, and for the other, a =

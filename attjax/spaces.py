@@ -1,6 +1,7 @@
 """Observation and action spaces, with the attributes that gymnax's have."""
 
 import dataclasses
+from typing import Any, ClassVar
 
 import chex
 import jax
@@ -12,14 +13,14 @@ class Discrete:
     """The integers 0 to n − 1."""
 
     n: int
-    shape = ()
-    dtype = jnp.int32
+    shape: ClassVar[tuple[int, ...]] = ()
+    dtype: ClassVar[Any] = jnp.int32
 
     def sample(self, key: chex.PRNGKey) -> chex.Array:
         """A uniformly random element, int32."""
         return jax.random.randint(key, self.shape, 0, self.n, self.dtype)
 
-    def contains(self, x) -> chex.Array:
+    def contains(self, x: Any) -> chex.Array:
         """Whether x is an integer of the space."""
         x = jnp.asarray(x)
         integral = jnp.issubdtype(x.dtype, jnp.integer) and x.shape == self.shape
@@ -39,7 +40,7 @@ class Box:
         return self.low.shape
 
     @property
-    def dtype(self):
+    def dtype(self) -> jnp.dtype:
         """Type of an element's entries."""
         return self.low.dtype
 
@@ -47,7 +48,7 @@ class Box:
         """A uniformly random element."""
         return jax.random.uniform(key, self.shape, self.dtype, self.low, self.high)
 
-    def contains(self, x) -> chex.Array:
+    def contains(self, x: Any) -> chex.Array:
         """Whether x has the space's shape and lies within its bounds."""
         x = jnp.asarray(x)
         if x.shape != self.shape:
