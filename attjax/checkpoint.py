@@ -61,18 +61,16 @@ class Saver:
         items = {"policy": learner.params["policy"], "learner": _storable(learner)}
         terminal_error = float("inf") if terminal_error is None else terminal_error
         saving = self._folder / belongings.SAVING
-        with quiet.orbax():
-            reason = None
+        with quiet.orbax() as failures:
             try:
                 self._write(saving, items, terminal_error, update)
             except Exception as error:  # Orbax raises many kinds, for a full disk among others
-                reason = _first_sentence(error)
+                failures.append(_first_sentence(error))
             finally:
                 shutil.rmtree(saving, ignore_errors=True)
-            if reason is not None:
-                quiet.clear_up()
-                path = self._folder / str(update)
-                raise FolderError(f"checkpoint {path} cannot be written: {reason}")
+        if failures:
+            path = self._folder / str(update)
+            raise FolderError(f"checkpoint {path} cannot be written: {failures[0]}")
         for path in self._superseded():
             with contextlib.suppress(OSError):  # tried again after the next save
                 belongings.remove(path)
@@ -239,17 +237,16 @@ def _restore(folder, update, item, template):
     target = jax.tree.map(
         lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype, sharding=x.sharding or device), template
     )
-    with quiet.orbax():
+    with quiet.orbax() as failures:
         try:
             with ocp.StandardCheckpointer() as checkpointer, _plain(path) as place:
                 return checkpointer.restore(place / item, target)
         except Exception as error:  # Orbax raises many kinds for damaged files
-            reason = _first_sentence(error)
-        quiet.clear_up()
+            failures.append(_first_sentence(error))
     advice = ""
     if len(saved) > 1 and belongings.is_surely_own(path, run_folder.run_id(Path(folder))):
         advice = f"; remove {path} to go back to the checkpoint before it"
-    raise FolderError(f"checkpoint {path.absolute() / item} cannot be read: {reason}{advice}")
+    raise FolderError(f"checkpoint {path.absolute() / item} cannot be read: {failures[0]}{advice}")
 
 
 def _first_sentence(error):

@@ -2,7 +2,6 @@
 
 import contextlib
 import functools
-import gc
 import logging
 import sys
 import traceback
@@ -13,27 +12,26 @@ LOGGERS = ("absl", "asyncio")
 
 
 @contextlib.contextmanager
-def orbax() -> Iterator[None]:
-    """Let Orbax neither log nor print tracebacks within the context; after it all is as before."""
+def orbax() -> Iterator[list[str]]:
+    """Let Orbax neither log nor print tracebacks within the context; after it all is as before.
+
+    But where it fails, as the caller notes in the list, other work that it had begun ends later, in
+    threads of its own: its tracebacks are then dropped to the end of the process.
+    """
+    failures: list[str] = []
     levels = {logging.getLogger(name): logging.getLogger(name).level for name in LOGGERS}
     hook = sys.unraisablehook
     for logger in levels:
         logger.setLevel(logging.CRITICAL)
-    sys.unraisablehook = functools.partial(_show, hook)
+    if getattr(hook, "func", None) is not _show:
+        sys.unraisablehook = functools.partial(_show, hook)
     try:
-        yield
+        yield failures
     finally:
-        sys.unraisablehook = hook
+        if not failures:
+            sys.unraisablehook = hook
         for logger, level in levels.items():
             logger.setLevel(level)
-
-
-def clear_up() -> None:
-    """Collect what Orbax left where it failed: it complains when that goes, not when it fails.
-
-    To be called within the context, when the exception is gone.
-    """
-    gc.collect()
 
 
 def _show(hook, unraisable):
