@@ -27,12 +27,14 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
     Raises:
         FunctionError: the features are a user's function that cannot be used.
     """
-    features = settings.features
+    features = settings.network.features
     if features not in FEATURES:
         features = user_functions.resolve(features)
         call = functools.partial(jax.eval_shape, features, *_first_sight(craft))
-        user_functions.check(f"features {settings.features}", call, rank=1)
-    return Policy(features, settings.hidden_sizes, craft.num_actions, settings.rate_margin)
+        user_functions.check(f"features {settings.network.features}", call, rank=1)
+    return Policy(
+        features, settings.network.hidden_sizes, craft.num_actions, settings.network.rate_margin
+    )
 
 
 def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) -> learner.Setup:
@@ -42,30 +44,32 @@ def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) ->
         FunctionError: the reward or the features are a user's function that cannot be used.
         ValueError: the rate mask leaves no torque, even at rest.
     """
-    reward = REWARDS.get(settings.reward) or user_functions.resolve(settings.reward)
+    reward = REWARDS.get(settings.task.reward) or user_functions.resolve(settings.task.reward)
     start = spacecraft.initial_state
-    if settings.near_goal_share > 0:
-        start = spacecraft.NearGoalStarts(settings.near_goal_share, settings.near_goal_steps)
-    env = AttitudeEnv(max(settings.frameskips), reward, start, craft)
-    if settings.reward not in REWARDS:
+    if settings.task.near_goal_share > 0:
+        start = spacecraft.NearGoalStarts(
+            settings.task.near_goal_share, settings.task.near_goal_steps
+        )
+    env = AttitudeEnv(max(settings.task.frameskips), reward, start, craft)
+    if settings.task.reward not in REWARDS:
         first_reward = functools.partial(_first_reward, env)
         user_functions.check(
-            f"reward {settings.reward}", lambda: jax.eval_shape(first_reward), rank=0
+            f"reward {settings.task.reward}", lambda: jax.eval_shape(first_reward), rank=0
         )
-    if settings.rate_margin > 0:
+    if settings.network.rate_margin > 0:
         _check_that_torques_are_left(settings, craft)
-    groups = len(settings.frameskips)
+    groups = len(settings.task.frameskips)
     return learner.Setup(env, policy(settings, craft), settings, groups, num_devices)
 
 
 def _check_that_torques_are_left(settings, craft):
-    for frameskip in settings.frameskips:
+    for frameskip in settings.task.frameskips:
         env = AttitudeEnv(frameskip, spacecraft=craft)
         at_rest = jnp.zeros(observation.SIZE)
         context = env.context(env.default_params)
-        if np.sum(rate_mask(at_rest, context, settings.rate_margin)) <= 1:
+        if np.sum(rate_mask(at_rest, context, settings.network.rate_margin)) <= 1:
             raise ValueError(
-                f"rate_margin {settings.rate_margin:g} masks every torque of {craft} with "
+                f"rate_margin {settings.network.rate_margin:g} masks every torque of {craft} with "
                 f"frameskip {frameskip}, even at rest; weaker torque_levels, smaller frameskips or "
                 f"a larger rate_limit leave some, and rate_margin 0 masks nothing"
             )
@@ -88,11 +92,11 @@ def num_devices(settings: Settings) -> int:
 
     Each has a spacecraft of each control rate, at least.
     """
-    shared = math.gcd(settings.num_envs, settings.minibatch_size, MAX_DEVICES)
+    shared = math.gcd(settings.ppo.num_envs, settings.ppo.minibatch_size, MAX_DEVICES)
     most = min(
         len(jax.devices()),
-        max(1, settings.minibatch_size // MIN_SAMPLES),
-        settings.num_envs // len(settings.frameskips),
+        max(1, settings.ppo.minibatch_size // MIN_SAMPLES),
+        settings.ppo.num_envs // len(settings.task.frameskips),
     )
     return max(n for n in range(1, shared + 1) if shared % n == 0 and n <= most)
 
@@ -104,11 +108,11 @@ def env_params(setup: learner.Setup) -> spacecraft.EnvParams:
     """
     settings, params = setup.settings, setup.env.default_params
     craft = setup.env.spacecraft
-    limits = [craft.max_steps(frameskip) for frameskip in settings.frameskips]
-    limits = np.minimum(limits, settings.max_episode_steps).astype(np.int32)
+    limits = [craft.max_steps(frameskip) for frameskip in settings.task.frameskips]
+    limits = np.minimum(limits, settings.task.max_episode_steps).astype(np.int32)
     if setup.groups == 1:
         return params.replace(max_steps_in_episode=jnp.asarray(limits[0]))
-    frameskips = np.array(settings.frameskips, np.int32)
+    frameskips = np.array(settings.task.frameskips, np.int32)
     return params.replace(
         max_steps_in_episode=jnp.asarray(limits[setup.group_of_row]),
         frameskip=jnp.asarray(frameskips[setup.group_of_row]),

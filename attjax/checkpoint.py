@@ -7,20 +7,17 @@ read back, and moved into place whole.
 
 import contextlib
 import functools
-import logging
 import os
 import re
 import shutil
-import sys
 import tempfile
-import traceback
 from pathlib import Path
 
 import jax
 import numpy as np
 import orbax.checkpoint as ocp
 
-from attjax import assembly, belongings, run_folder
+from attjax import assembly, belongings, quiet, run_folder
 from attjax.learner import Learner
 from attjax.networks import Policy
 from attjax.run_folder import FolderError
@@ -30,19 +27,6 @@ PLAIN = r"[A-Za-z0-9_./ +=,@-]*"
 """Paths that Orbax takes as they are. It looks for parts of a checkpoint by patterns that begin
 with the path, so that one with brackets would find none."""
 
-for name in ("absl", "asyncio"):  # where Orbax logs at length what it also raises
-    logging.getLogger(name).setLevel(logging.CRITICAL)
-
-_unraisable = sys.unraisablehook
-
-
-def _hook(unraisable):
-    """Print no traceback of what Orbax leaves be where another array's file fails."""
-    files = [frame.filename for frame in traceback.extract_tb(unraisable.exc_traceback)]
-    is_orbax = any("orbax" in Path(file).parts for file in files)
-    if not is_orbax and str(unraisable.exc_value) != "Event loop is closed":
-        _unraisable(unraisable)
-
 
 class Saver:
     """Saves learners into a run folder that is open; use as a context manager.
@@ -51,7 +35,6 @@ class Saver:
     """
 
     def __init__(self, folder: Path):
-        sys.unraisablehook = _hook
         self._folder, self._run = Path(folder), run_folder.run_id(Path(folder))
         self._orbax = ocp.Checkpointer(ocp.CompositeCheckpointHandler())
 
@@ -59,7 +42,8 @@ class Saver:
         return self
 
     def __exit__(self, *_):
-        self._orbax.close()
+        with quiet.orbax():
+            self._orbax.close()
 
     def save(self, learner: Learner, terminal_error: float | None = None) -> None:
         """Save at once, and read it back; a checkpoint of the same update is left as it is.
@@ -75,20 +59,25 @@ class Saver:
         if update in _saved(self._folder):
             return
         items = {"policy": learner.params["policy"], "learner": _storable(learner)}
-        error = float("inf") if terminal_error is None else terminal_error
+        terminal_error = float("inf") if terminal_error is None else terminal_error
         saving = self._folder / belongings.SAVING
-        try:
-            self._write(saving, items, error, update)
-        except Exception as error:  # Orbax raises many kinds, for a full disk among others
-            path, reason = self._folder / str(update), _first_sentence(error)
-            raise FolderError(f"checkpoint {path} cannot be written: {reason}") from None
-        finally:
-            shutil.rmtree(saving, ignore_errors=True)
+        with quiet.orbax():
+            reason = None
+            try:
+                self._write(saving, items, terminal_error, update)
+            except Exception as error:  # Orbax raises many kinds, for a full disk among others
+                reason = _first_sentence(error)
+            finally:
+                shutil.rmtree(saving, ignore_errors=True)
+            if reason is not None:
+                quiet.clear_up()
+                path = self._folder / str(update)
+                raise FolderError(f"checkpoint {path} cannot be written: {reason}")
         for path in self._superseded():
             with contextlib.suppress(OSError):  # tried again after the next save
                 belongings.remove(path)
 
-    def _write(self, saving, items, error, update):
+    def _write(self, saving, items, terminal_error, update):
         shutil.rmtree(saving, ignore_errors=True)
         saving.mkdir()
         whole = saving / "checkpoint"
@@ -96,7 +85,7 @@ class Saver:
             saved = {name: ocp.args.StandardSave(item) for name, item in items.items()}
             self._orbax.save(place / whole.name, args=ocp.args.Composite(**saved))
             self._check(place / whole.name, items)
-        belongings.write_label(whole, self._run, error)
+        belongings.write_label(whole, self._run, terminal_error)
         path = self._folder / str(update)
         if os.path.lexists(path):  # of someone else
             path = path.with_name(path.name + belongings.OWN_NAME)
@@ -229,13 +218,13 @@ def _restore(folder, update, item, template):
     target = jax.tree.map(
         lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype, sharding=x.sharding or device), template
     )
-    sys.unraisablehook = _hook
-    with ocp.StandardCheckpointer() as checkpointer:
+    with quiet.orbax():
         try:
-            with _plain(path) as place:
+            with ocp.StandardCheckpointer() as checkpointer, _plain(path) as place:
                 return checkpointer.restore(place / item, target)
         except Exception as error:  # Orbax raises many kinds for damaged files
             reason = _first_sentence(error)
+        quiet.clear_up()
     advice = ""
     if len(saved) > 1 and belongings.is_surely_own(path, run_folder.run_id(Path(folder))):
         advice = f"; remove {path} to go back to the checkpoint before it"

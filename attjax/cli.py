@@ -1,16 +1,16 @@
-"""What the commands share: arguments, one-line errors, paths, devices."""
+"""What the commands share: arguments, and how they are parsed. It imports no JAX."""
 
 import argparse
-import contextlib
-import dataclasses
 import functools
-import os
+import re
 import shlex
-import sys
 from pathlib import Path
+from typing import Any, NoReturn
 
-from attjax import errors, help_text, jax_setup, settings
+from attjax import errors, fields, help_text, settings
 
+Group = argparse._ActionsContainer
+"""A parser, or a group of its flags."""
 DEVICES = ("auto", "cpu", "gpu")
 TABLE_2 = 5
 """Frameskip of the paper's Table 2, 40 Hz."""
@@ -19,12 +19,34 @@ TABLE_2 = 5
 class Parser(argparse.ArgumentParser):
     """An argument parser whose errors are one line, and exit status 2."""
 
-    def __init__(self, **options):
+    def __init__(self, **options: Any):
+        options = {"prog": errors.running()} | options
         super().__init__(allow_abbrev=False, formatter_class=help_text.Formatter, **options)
 
-    def error(self, message: str):
+    def error(self, message: str) -> NoReturn:
         """Print the message as one line and exit."""
-        errors.fail(self.prog, message)
+        errors.fail(message)
+
+
+def invocation(command: str) -> str:
+    """How to start a program, as the one that runs was started.
+
+    Example:
+        >>> invocation("eval")
+        'attjax eval'
+    """
+    is_file = errors.running().endswith(".py")
+    return f"python {command}.py" if is_file else f"attjax {command}"
+
+
+def examples(text: str) -> str:
+    """The examples of a program's help, started as the one that runs was.
+
+    Example:
+        >>> examples("python train.py --resume")
+        'attjax train --resume'
+    """
+    return re.sub(r"python (\w+)\.py", lambda found: invocation(found[1]), text)
 
 
 def quoted(path: Path) -> str:
@@ -42,7 +64,7 @@ def path(text: str) -> Path:
         raise argparse.ArgumentTypeError(f"there is no home for {text!r}; write it out") from None
 
 
-def add_checkpoint(group) -> None:
+def add_checkpoint(group: Group) -> None:
     """Add --checkpoint."""
     folder_help = "folder of the training run (default: ckpt)"
     group.add_argument(
@@ -50,24 +72,24 @@ def add_checkpoint(group) -> None:
     )
 
 
-def add_best(group) -> None:
+def add_best(group: Group) -> None:
     """Add --best, which belongs beside --checkpoint."""
     best_help = "the checkpoint with the least terminal error in training, not the newest"
     group.add_argument("--best", action="store_true", help=best_help)
 
 
-def add_seed_and_device(group, seed_help: str) -> None:
+def add_seed_and_device(group: Group, seed_help: str) -> None:
     """Add --seed and --device."""
-    add_number(group, "seed", int, None, f"{seed_help} (default: 0)", **settings.SEED)
+    add_number(group, "seed", int, None, f"{seed_help} (default: 0)", **fields.SEED)
     device_help = "where to compute (default: auto, a GPU if JAX finds one)"
     group.add_argument("--device", choices=DEVICES, default="auto", help=device_help)
 
 
-def add_frameskip(group, meaning: str) -> None:
+def add_frameskip(group: Group, meaning: str) -> None:
     """Add --frameskip, None where it is not given: :func:`frameskip` then chooses."""
     default = f"{TABLE_2} as in Table 2 if that was trained, else the trained one nearest to it"
     help = f"{meaning} (default: {default})"
-    add_number(group, "frameskip", int, None, help, **settings.FRAMESKIP)
+    add_number(group, "frameskip", int, None, help, **fields.FRAMESKIP)
 
 
 def frameskip(given: int | None, trained: tuple[int, ...] | None) -> int:
@@ -86,19 +108,18 @@ def frameskip(given: int | None, trained: tuple[int, ...] | None) -> int:
     return min(trained or [TABLE_2], key=lambda k: (abs(k - TABLE_2), k))
 
 
-def warn_of_untrained(prog: str, frameskip: int, trained: tuple[int, ...] | None) -> None:
+def warn_of_untrained(frameskip: int, trained: tuple[int, ...] | None) -> None:
     """Print a line on stderr for a frameskip that the policy was not trained at."""
     if trained and frameskip not in trained:
         rates = ", ".join(map(str, sorted(set(trained))))
-        print(
-            f"{prog}: warning: frameskip {frameskip} was not trained; the run trained {rates}",
-            file=sys.stderr,
-        )
+        errors.warning_line(f"frameskip {frameskip} was not trained; the run trained {rates}")
 
 
-def add_number(group, name: str, kind: type, default, help: str, **details) -> None:
-    """Add the flag of a number with details as in :func:`attjax.settings.setting`."""
-    field = settings.single(name, kind, help, **details)
+def add_number(
+    group: Group, name: str, kind: type, default: float | None, help: str, **details: Any
+) -> None:
+    """Add the flag of a number with details as in :func:`attjax.fields.setting`."""
+    field = fields.single(name, kind, help, **details)
     help = help_text.meaning(field)
     group.add_argument(
         "--" + name,
@@ -109,9 +130,9 @@ def add_number(group, name: str, kind: type, default, help: str, **details) -> N
     )
 
 
-def add_settings(group, name: str) -> None:
+def add_settings(group: Group, name: str) -> None:
     """Add a flag for every setting of a group; those not given are left out of the namespace."""
-    for field in dataclasses.fields(settings.Settings):
+    for field in settings.FIELDS.values():
         if field.metadata["group"] != name:
             continue
         flag = "--" + field.name.replace("_", "-")
@@ -140,51 +161,11 @@ def _parse(field, text):
     except ValueError:
         value = text
     try:
-        return settings.check(field, value)
+        return fields.check(field, value)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def overrides(arguments: argparse.Namespace) -> dict:
+def overrides(arguments: argparse.Namespace) -> dict[str, Any]:
     """The settings that were given on the command line."""
-    names = {field.name for field in dataclasses.fields(settings.Settings)}
-    return {name: value for name, value in vars(arguments).items() if name in names}
-
-
-def select_device(name: str):
-    """The JAX device for ``--device``, made the default, of JAX as the programs need it.
-
-    On CPU each core becomes a device of its own, for training to share its work out to.
-
-    Raises:
-        errors.UserError: there is no such device, or JAX refuses a variable of the environment.
-    """
-    try:
-        import jax
-    except ValueError as error:
-        named = [x for x in os.environ if x.startswith("JAX_") and x.lower() in str(error).lower()]
-        values = jax_setup.set_variables(named)
-        raise errors.UserError(f"JAX refuses its settings: {values or error}") from None
-    if name == "cpu":
-        jax.config.update("jax_platforms", "cpu")
-        jax.config.update("jax_platform_name", "cpu")
-    with contextlib.suppress(RuntimeError):  # called where JAX runs already, as it is set up there
-        jax.config.update("jax_num_cpu_devices", available_cores())
-    jax_setup.pin_settings()
-    jax_setup.keep_compiled()
-    try:
-        device = jax.devices(None if name == "auto" else name)[0]
-    except (RuntimeError, AssertionError):  # the latter: JAX_PLATFORMS=cuda, but no such plug-in
-        found = jax_setup.set_variables(jax_setup.CHOOSING_DEVICES)
-        if not found:
-            found = f"it finds {jax.default_backend()}"
-        raise errors.UserError(f"--device is {name}, and JAX finds none; {found}") from None
-    jax.config.update("jax_default_device", device)
-    return device
-
-
-def available_cores() -> int:
-    """The cores that this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return {k: value for k, value in vars(arguments).items() if k in settings.FIELDS}

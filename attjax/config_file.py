@@ -7,15 +7,15 @@ import textwrap
 import tomllib
 from pathlib import Path
 
-from attjax import help_text, presets, settings, specification
+from attjax import fields, help_text, presets, settings, specification, streams
 from attjax.errors import UserError
 from attjax.run_folder import Config
 from attjax.specification import Spacecraft
 
-SETTINGS = {field.name: field for field in dataclasses.fields(settings.Settings)}
+SETTINGS = settings.FIELDS
 OTHERS = (
-    settings.single("preset", str, "the recipe", choices=tuple(presets.PRESETS)),
-    settings.single("seed", int, "of everything random", **settings.SEED),
+    fields.single("preset", str, "the recipe", choices=tuple(presets.PRESETS)),
+    fields.single("seed", int, "of everything random", **fields.SEED),
 )
 FIELDS = SETTINGS | {field.name: field for field in OTHERS}
 
@@ -36,7 +36,7 @@ def read(path: Path) -> dict:
     if unknown:
         raise UserError(f"--config {path} has unknown names: {', '.join(sorted(unknown))}")
     with _one_line(f"--config {path}"):
-        given = {k: settings.check(FIELDS[k], v) for k, v in (given | content).items()}
+        given = {k: fields.check(FIELDS[k], v) for k, v in (given | content).items()}
         if spacecraft is not None:
             given["spacecraft"] = specification.from_lists(spacecraft, specification.NEEDED)
     return given
@@ -72,11 +72,11 @@ def text(config: Config) -> str:
         ['preset = "paper"', 'seed = 3']
     """
     lines = [f'preset = "{config.preset}"', f"seed = {config.seed}", "", "[settings]"]
-    for group, title in settings.GROUPS.items():
+    for group, title in fields.GROUPS.items():
         lines += ["", f"# --- {title} ---"]
         for name, field in SETTINGS.items():
             if field.metadata["group"] == group:
-                value = getattr(config.settings, name)
+                value = config.settings.flat[name]
                 lines += [*_comment(field), f"{name} = {_toml(value)}"]
     lines += ["", "[spacecraft]", "# kg m^2, N m, rad/s, degrees and s; body frame"]
     values = dataclasses.asdict(config.spacecraft)
@@ -85,8 +85,8 @@ def text(config: Config) -> str:
 
 
 def _comment(field):
-    described = "; ".join(filter(None, (help_text.meaning(field), settings.limits(field))))
-    described = help_text.plain(described)
+    described = "; ".join(filter(None, (help_text.meaning(field), fields.limits(field))))
+    described = streams.plain(described)
     return textwrap.wrap(described, 100, initial_indent="# ", subsequent_indent="# ")
 
 

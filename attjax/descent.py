@@ -1,7 +1,7 @@
 """The gradient steps of an update: shuffled minibatches, the clipped loss, Adam."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import chex
 import jax
@@ -10,9 +10,11 @@ import optax
 from flax import struct
 from jax.flatten_util import ravel_pytree
 
-from attjax import losses, vector
-from attjax.learner import Learner, Setup, entropy_coefficient, optimizer
-from attjax.networks import Inputs
+from attjax import losses
+from attjax.learner import Learner, entropy_coefficient, optimizer
+from attjax.networks import Inputs, Policy
+from attjax.settings import PPO
+from attjax.sharding import AXIS
 
 MAX_INDEX_BITS = 18
 
@@ -31,19 +33,20 @@ class Sample:
     target: chex.Array
 
 
-def optimize(setup, learner, samples: Sample) -> tuple[Learner, dict]:
+def optimize(
+    policy: Policy, settings: PPO, learner: Learner, samples: Sample, num_devices: int
+) -> tuple[Learner, dict]:
     """N passes of shuffled minibatches. Returns the learner and the losses' means.
 
     Each device shuffles its own samples; a minibatch takes the same number of each device's.
     What is shuffled are blocks of neighbours, up to SHUFFLED_TOGETHER spacecraft at one time:
     samples independent of each other that memory gives four times as fast as single ones.
     """
-    settings = setup.settings
-    transformation = optimizer(settings)
-    per_device = settings.minibatch_size // setup.num_devices
-    block = math.gcd(setup.envs_per_device, per_device, SHUFFLED_TOGETHER)
+    adam = optimizer(settings)
+    per_device = settings.minibatch_size // num_devices
+    block = math.gcd(settings.num_envs // num_devices, per_device, SHUFFLED_TOGETHER)
     num_blocks = len(samples.action) // block
-    entropy_weight = entropy_coefficient(settings, learner.update)
+    weights = LossWeights(settings.clip, entropy_coefficient(settings, learner.update))
 
     def gradient_step(carry, minibatch):
         params, state = carry
@@ -51,9 +54,9 @@ def optimize(setup, learner, samples: Sample) -> tuple[Learner, dict]:
         sample = jax.tree.map(lambda x: take_blocks(x, num_blocks, chosen), samples)
         sample = sample.replace(advantage=advantage)
         gradients, metrics = jax.grad(loss, argnums=1, has_aux=True)(
-            setup, params, sample, entropy_weight
+            policy, params, sample, weights
         )
-        return _descend(transformation, params, state, gradients), metrics
+        return _descend(adam, params, state, gradients), metrics
 
     def one_pass(carry, key):
         used = settings.minibatches * (per_device // block)
@@ -65,12 +68,10 @@ def optimize(setup, learner, samples: Sample) -> tuple[Learner, dict]:
         return jax.lax.scan(gradient_step, carry, (order, advantage))
 
     key, pass_key = jax.random.split(learner.key)
-    pass_key = jax.random.fold_in(pass_key, jax.lax.axis_index(vector.AXIS))
-    (params, state), metrics = jax.lax.scan(
-        one_pass,
-        (learner.params, learner.optimizer),
-        jax.random.split(pass_key, settings.passes),
-    )
+    pass_key = jax.random.fold_in(pass_key, jax.lax.axis_index(AXIS))
+    pass_keys = jax.random.split(pass_key, settings.passes)
+    start = learner.params, learner.optimizer
+    (params, state), metrics = jax.lax.scan(one_pass, start, pass_keys)
     learner = learner.replace(params=params, optimizer=state, key=key)
     return learner, jax.tree.map(jnp.mean, metrics)
 
@@ -99,14 +100,14 @@ def random_order(key, count: int) -> chex.Array:
 
 def _minibatch_means(x):
     """Means over each row of x, a minibatch, and over the devices that share it."""
-    return jax.lax.pmean(jnp.mean(x, axis=1, keepdims=True), vector.AXIS)
+    return jax.lax.pmean(jnp.mean(x, axis=1, keepdims=True), AXIS)
 
 
 def _descend(transformation, params, state, gradients):
     """The optimizer's step along the gradients' mean over the devices, in a single exchange."""
     vectors = {name: ravel_pytree(tree)[0] for name, tree in gradients.items()}
     joined, part = ravel_pytree(vectors)
-    vectors = part(jax.lax.pmean(joined, vector.AXIS))
+    vectors = part(jax.lax.pmean(joined, AXIS))
     moved, states = {}, {}
     for name, tree in params.items():
         move, states[name] = transformation.update(vectors[name], state[name])
@@ -115,20 +116,26 @@ def _descend(transformation, params, state, gradients):
     return moved, states
 
 
+class LossWeights(NamedTuple):
+    """What weighs in :func:`loss`: ε of Eq. 4, and the entropy bonus's c."""
+
+    clip: float
+    entropy: chex.Array | float
+
+
 def loss(
-    setup: Setup, params: dict, sample: Sample, entropy_weight
+    policy: Policy, params: dict, sample: Sample, weights: LossWeights
 ) -> tuple[chex.Array, dict[str, Any]]:
     """Clipped objective with entropy bonus plus the value's mean squared error.
 
     The two networks share no parameters, so the sum trains each on its own loss.
     """
-    policy = setup.policy
     log_probabilities = policy.log_probabilities(params, sample.inputs)
     policy_loss, diagnostics = losses.clipped_policy_loss(
         losses.pick(log_probabilities, sample.action),
         sample.log_probability,
         sample.advantage,
-        setup.settings.clip,
+        weights.clip,
     )
     entropy = jnp.mean(losses.entropy(log_probabilities))
     residual = policy.value(params, sample.inputs.features) - sample.target
@@ -140,4 +147,4 @@ def loss(
         "explained_variance": 1 - jnp.var(residual) / (jnp.var(sample.target) + 1e-12),
         **diagnostics,
     }
-    return policy_loss - entropy_weight * entropy + value_loss, metrics
+    return policy_loss - weights.entropy * entropy + value_loss, metrics

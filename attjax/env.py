@@ -6,6 +6,7 @@ from collections.abc import Callable
 import chex
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from attjax import observation as observations
 from attjax import quaternion as quaternions
@@ -15,6 +16,13 @@ from attjax.reward import Transition, paper_reward
 from attjax.spacecraft import EnvParams, EnvState
 from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft
 from attjax.values import integer
+
+_OBSERVATION, _STEPS = np.uint32(2**32 - 1), np.uint32(2**32 - 2)
+"""What ``fold_in`` derives keys with that share nothing with the one they come from.
+
+``uniform``, ``split`` and ``fold_in`` all encrypt numbers with the key: the first two 0, 1, 2, …,
+the last the one that it is given, which must therefore be one that no draw counts up to.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,7 +97,7 @@ class AttitudeEnv:
         params = self.default_params if params is None else params
         spacecraft.check_params(params, self.frameskip)
         state = self.initial_state(key, params)
-        return observations.observe(state.quaternion, state.angular_velocity), state
+        return self.observe(observation_key(key), state, params), state
 
     reset_env = reset
 
@@ -97,7 +105,7 @@ class AttitudeEnv:
         """One agent step; an episode that ends is followed by a fresh one.
 
         Args:
-            key: for the next episode's slew.
+            key: of this step, and of the next episode's start.
             state, action, params: as in :func:`attjax.step`.
 
         Returns:
@@ -110,7 +118,7 @@ class AttitudeEnv:
         """
         params = self.default_params if params is None else params
         observation, next_state, reward, terminated, info = self.step_env(
-            key, state, action, params
+            steps_key(key), state, action, params
         )
         truncated = info["truncated"]
         fresh_observation, fresh_state = self.reset_env(key, params)
@@ -128,10 +136,12 @@ class AttitudeEnv:
         Returns:
             Observation (11,), state, reward, terminated, info. ``info["score"]`` is the
             reward of Eq. 12–13 whatever the environment's own; ``info["outcome"]`` describes
-            the spacecraft after the step and is meant to be read at an episode's end.
+            the spacecraft after the step and is meant to be read at an episode's end;
+            ``info["torque"]``, (3,), N m, body frame, is what acted for the context's
+            ``torque_duration``.
         """
-        del key
         next_state = spacecraft.step(state, action, params, self.frameskip)
+        torque = spacecraft.applied_torque(action, params)
         rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2))
         terminated = rate > params.rate_limit
         truncated = ~terminated & (next_state.time >= params.max_steps_in_episode)
@@ -143,21 +153,40 @@ class AttitudeEnv:
             truncated=truncated,
             goal_angle=params.goal_angle,
             control_period=self._period(params),
-            impulse=params.torque_table[action] * self.context(params).torque_duration,
+            impulse=torque * self.context(params).torque_duration,
         )
         angle = quaternions.error_angle(next_state.quaternion)
         info = {
             "terminated": terminated,
             "truncated": truncated,
             "score": paper_reward(transition),
+            "torque": torque,
             "outcome": {
                 "success_rate": (truncated & (angle <= params.goal_angle)).astype(rate.dtype),
                 "overspeed_rate": terminated.astype(rate.dtype),
                 "terminal_error_deg": jnp.rad2deg(angle),
             },
         }
-        observation = observations.observe(next_state.quaternion, next_state.angular_velocity)
+        observation = self.observe(key, next_state, params)
         return observation, next_state, self.reward(transition), terminated, info
+
+    def observe(self, key: chex.PRNGKey, state: EnvState, params: EnvParams) -> chex.Array:
+        """What an agent is told of a state: the observation (11,) of Eq. 11.
+
+        Args:
+            key: for what is random in it; here nothing is.
+            state: of one spacecraft.
+            params: its parameters.
+        """
+        del key, params
+        return observations.observe(state.quaternion, state.angular_velocity)
+
+    def starts_whole(self, state: EnvState) -> chex.Array:
+        """Whether the episode that begins with this state is one of the task's: a bool a state.
+
+        The others, practice from the middle of it, count in no metric.
+        """
+        return spacecraft.starts_whole(state)
 
     def observation_space(self, params: EnvParams) -> spaces.Box:
         """Bounds of Eq. 11 up to the step that exceeds the rate limit.
@@ -175,3 +204,18 @@ class AttitudeEnv:
     def action_space(self, params: EnvParams | None = None) -> spaces.Discrete:
         """The rows of the torque table."""
         return spaces.Discrete(self.num_actions if params is None else len(params.torque_table))
+
+
+def observation_key(key: chex.PRNGKey) -> chex.PRNGKey:
+    """The key of an episode's first observation, from the key of its reset."""
+    return jax.random.fold_in(key, _OBSERVATION)
+
+
+def steps_key(key: chex.PRNGKey) -> chex.PRNGKey:
+    """The key of an episode's steps, from the key of its reset; a step's is folded in from it.
+
+    Example:
+        >>> key = steps_key(jax.random.key(0))
+        >>> third = jax.random.fold_in(key, 2)
+    """
+    return jax.random.fold_in(key, _STEPS)

@@ -1,46 +1,48 @@
 """How the programs fail: one line on stderr, and an exit status."""
 
 import contextlib
+import contextvars
 import functools
 import signal
 import sys
+from collections.abc import Callable, Iterator
+from typing import NoReturn
 
-from attjax import help_text, streams, user_functions
+from attjax import streams
 
 OUTPUT_FAILED, BAD_INPUT = 1, 2
 
+Main = Callable[..., int]
+
 
 class UserError(Exception):
-    """Bad input; the message is one line that names what is wrong and what is allowed."""
+    """Bad input; the message is one line that names what is wrong and what is allowed.
+
+    What users can put right is of this class, or of one derived from it, wherever it is found.
+    """
 
 
-def program(name: str):
-    """Make a function a command: it prints anywhere, and goes on where printing fails.
+_running = contextvars.ContextVar("_running", default="attjax")
+
+
+def running() -> str:
+    """The name of the program that runs; its lines on stderr begin with it."""
+    return _running.get()
+
+
+def program(name: str) -> Callable[[Main], Main]:
+    """Make a function a program: it prints anywhere, and goes on where printing fails.
 
     Done all the same, it returns 1 instead of 0, with a line on stderr unless its reader left.
-    Interrupted from the keyboard it returns 130.
+    Interrupted from the keyboard it returns 130. ``prog`` gives it another name.
     """
 
     def decorate(main):
         @functools.wraps(main)
-        def command(argv=None) -> int:
-            with streams.guarded():
-                help_text.print_anywhere()
-                try:
-                    status = main(argv)
-                except KeyboardInterrupt:  # training hears it itself
-                    error_line(name, "interrupted")
-                    status = 128 + signal.SIGINT
-                except SystemExit as exit_:  # of --help, or of bad input
-                    if exit_.code or not streams.failure():
-                        raise
-                    status = 0
-                failure = streams.failure()
-                if status or failure is None:
-                    return status
-                if not streams.reader_left(failure):
-                    error_line(name, f"all is done, but stdout failed: {failure.strerror}")
-                return OUTPUT_FAILED
+        def command(argv=None, prog=name) -> int:
+            with _named(prog), streams.guarded():
+                streams.print_anywhere()
+                return _status(main, argv)
 
         return command
 
@@ -48,33 +50,66 @@ def program(name: str):
 
 
 @contextlib.contextmanager
-def one_line_errors(prog: str, *kinds: type[Exception]):
-    """Turn exceptions of these kinds, and what the system says of a file, into one line on stderr
-    and exit status 2.
+def _named(name):
+    token = _running.set(name)
+    try:
+        yield
+    finally:
+        _running.reset(token)
+
+
+def _status(main, argv):
+    """The exit status of a program, and of its output."""
+    try:
+        status = main(argv)
+    except KeyboardInterrupt:  # training hears it itself
+        error_line("interrupted")
+        status = 128 + signal.SIGINT
+    except SystemExit as exit_:  # of --help, or of bad input
+        if exit_.code or not streams.failure():
+            raise
+        status = 0
+    failure = streams.failure()
+    if status or failure is None:
+        return status
+    if not streams.reader_left(failure):
+        error_line(f"all is done, but stdout failed: {failure.strerror}")
+    return OUTPUT_FAILED
+
+
+@contextlib.contextmanager
+def one_line_errors(*kinds: type[Exception]) -> Iterator[None]:
+    """Turn a :class:`UserError`, exceptions of these kinds and what the system says of a file into
+    one line on stderr and exit status 2.
     """
     try:
         yield
-    except (UserError, user_functions.FunctionError, *kinds) as error:
-        fail(prog, error)
+    except (UserError, *kinds) as error:
+        fail(error)
     except OSError as error:  # a folder that may not be entered, a name that is too long, ...
         if error.filename is None:
             raise
-        fail(prog, f"{error.filename}: {error.strerror}")
+        fail(f"{error.filename}: {error.strerror}")
 
 
-def error_line(prog: str, message) -> None:
+def error_line(message: object) -> None:
     """Print the message as one line on stderr."""
-    print(f"{prog}: error: {' '.join(str(message).split())}", file=sys.stderr)
+    print(f"{running()}: error: {' '.join(str(message).split())}", file=sys.stderr)
 
 
-def fail(prog: str, message):
+def warning_line(message: object) -> None:
+    """Print a warning on stderr."""
+    print(f"{running()}: warning: {message}", file=sys.stderr)
+
+
+def fail(message: object) -> NoReturn:
     """Print the message as one line on stderr and exit with BAD_INPUT."""
-    error_line(prog, message)
+    error_line(message)
     sys.exit(BAD_INPUT)
 
 
 @contextlib.contextmanager
-def enough_memory(advice: str):
+def enough_memory(advice: str) -> Iterator[None]:
     """Turn JAX's errors about memory into a :class:`UserError` with this advice."""
     try:
         yield

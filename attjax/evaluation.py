@@ -9,12 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import numerics, rigid_body, spacecraft
-from attjax import observation as observations
+from attjax import numerics, rigid_body
 from attjax import quaternion as quaternions
 from attjax.context import Context
 from attjax.controllers import average_torque
-from attjax.env import AttitudeEnv
+from attjax.env import AttitudeEnv, observation_key, steps_key
 from attjax.spacecraft import EnvParams, EnvState
 from attjax.values import integer
 
@@ -94,32 +93,15 @@ def fly(
     if (integer(episodes) or 0) < 1:
         raise ValueError(f"episodes is {episodes!r}; it must be an integer at least 1")
     observation, state = random_slews(env, params, key, episodes)
-    context = env.context(params)
+    keys, context = _steps_keys(key, episodes), env.context(params)
 
     def step(index, carry):
         observation, state, so_far, excess = carry
-        action = jax.vmap(controller, (0, None))(observation, context)
-        next_observation, next_state, _, terminated, info = jax.vmap(
-            env.step_env, (None, 0, 0, None)
-        )(key, state, action, params)
-        angle = jax.vmap(quaternions.error_angle)(next_state.quaternion)
-        rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2, axis=-1))
-        torque = jnp.sqrt(jnp.sum(params.torque_table[action] ** 2, axis=-1))
-        closer = angle < so_far.closest_angle
-        impulse, excess = numerics.add((so_far.impulse, excess), torque * context.torque_duration)
-        updated = Episodes(
-            closest_angle=jnp.where(closer, angle, so_far.closest_angle),
-            closest_rate=jnp.where(closer, rate, so_far.closest_rate),
-            terminal_angle=angle,
-            terminal_rate=rate,
-            overspeed=terminated,
-            last_outside=jnp.where(angle > params.goal_angle, index + 1, so_far.last_outside),
-            score=so_far.score + info["score"],
-            impulse=impulse,
-        )
+        results = _step(controller, env, params, keys, index, observation, state)
+        updated, excess = _updated(so_far, excess, index + 1, results, context, params)
         ended = so_far.overspeed
         so_far = jax.tree.map(lambda old, new: jnp.where(ended, old, new), so_far, updated)
-        return next_observation, next_state, so_far, excess
+        return *results[:2], so_far, excess
 
     zero = jnp.zeros(episodes, observation.dtype)
     start = Episodes(zero + jnp.inf, zero, zero, zero, zero > 0, zero.astype(jnp.int32), zero, zero)
@@ -127,21 +109,63 @@ def fly(
     return jax.lax.fori_loop(0, steps, step, (observation, state, start, zero))[2]
 
 
+def _steps_keys(key, episodes):
+    """The key of each episode's steps, of :func:`random_slews` from the same key."""
+    return jax.vmap(steps_key)(jax.random.split(key, episodes))
+
+
+def _step(controller, env, params, keys, index, observation, state):
+    """What ``step_env`` returns of all slews under the controller, each with a key of its own."""
+    action = jax.vmap(controller, (0, None))(observation, env.context(params))
+    keys = jax.vmap(jax.random.fold_in, (0, None))(keys, index)
+    return jax.vmap(env.step_env, (0, 0, 0, None))(keys, state, action, params)
+
+
+def _updated(so_far, excess, number, results, context, params):
+    """The outcome after a step, counted from 1, were none ended; and what the impulse lacks."""
+    _, state, _, terminated, info = results
+    angle = jax.vmap(quaternions.error_angle)(state.quaternion)
+    rate = jnp.sqrt(jnp.sum(state.angular_velocity**2, axis=-1))
+    torque = jnp.sqrt(jnp.sum(info["torque"] ** 2, axis=-1))
+    closer = angle < so_far.closest_angle
+    impulse, excess = numerics.add((so_far.impulse, excess), torque * context.torque_duration)
+    updated = Episodes(
+        closest_angle=jnp.where(closer, angle, so_far.closest_angle),
+        closest_rate=jnp.where(closer, rate, so_far.closest_rate),
+        terminal_angle=angle,
+        terminal_rate=rate,
+        overspeed=terminated,
+        last_outside=jnp.where(angle > params.goal_angle, number, so_far.last_outside),
+        score=so_far.score + info["score"],
+        impulse=impulse,
+    )
+    return updated, excess
+
+
 @functools.partial(jax.jit, static_argnames=("env", "steps"))
 def record(
-    controller: Controller, env: AttitudeEnv, params: EnvParams, start: EnvState, steps: int
+    controller: Controller,
+    env: AttitudeEnv,
+    params: EnvParams,
+    key: chex.PRNGKey,
+    start: EnvState,
+    steps: int,
 ) -> History:
-    """Fly slews from a batch of states without ending them early, and keep every step."""
+    """Fly slews from a batch of states without ending them early, and keep every step.
 
-    def step(state, _):
-        observation = jax.vmap(observations.observe)(state.quaternion, state.angular_velocity)
-        action = jax.vmap(controller, (0, None))(observation, env.context(params))
-        state = jax.vmap(
-            lambda state, action: spacecraft.step(state, action, params, env.frameskip)
-        )(state, action)
-        return state, History(state.quaternion, state.angular_velocity, params.torque_table[action])
+    Of slews of :func:`random_slews`, and with the same key, they are the flights of :func:`fly`.
+    """
+    slews = len(start.time)
+    first = jax.vmap(lambda key, state: env.observe(observation_key(key), state, params))
+    observation = first(jax.random.split(key, slews), start)
+    keys = _steps_keys(key, slews)
 
-    return jax.lax.scan(step, start, length=steps)[1]
+    def step(carry, index):
+        observation, state, _, _, info = _step(controller, env, params, keys, index, *carry)
+        history = History(state.quaternion, state.angular_velocity, info["torque"])
+        return (observation, state), history
+
+    return jax.lax.scan(step, (observation, start), jnp.arange(steps))[1]
 
 
 def conditions(env: AttitudeEnv, params: EnvParams, seed: int, episodes: int) -> dict:

@@ -69,10 +69,11 @@ def _not_tied(logits, masked):
 def flown_decisions(flight: FlightPolicy, seed: int, slews: int, states_per_slew: int) -> Decisions:
     """Decisions at states evenly spaced in time along random slews that the policy flies."""
     params = flight.env.default_params
-    _, start = evaluation.random_slews(flight.env, params, jax.random.key(seed), slews)
+    key = jax.random.key(seed)
+    _, start = evaluation.random_slews(flight.env, params, key, slews)
     act = jax.tree_util.Partial(flight.policy.act, flight.params)
     steps = int(params.max_steps_in_episode)
-    history = evaluation.record(act, flight.env, params, start, steps)
+    history = evaluation.record(act, flight.env, params, key, start, steps)
     chosen = np.linspace(0, steps - 1, states_per_slew).astype(int)
     states = (np.asarray(x)[chosen] for x in (history.quaternion, history.angular_velocity))
     return decisions(flight, *(x.reshape(-1, x.shape[-1]) for x in states))
@@ -104,7 +105,8 @@ def fly_table_5(flight: FlightPolicy) -> Flown:
             torque_table=jnp.asarray(flight.torque_table, float),
         )
         steps, start = int(params.max_steps_in_episode), _table_5(flight.env.spacecraft)
-        history = evaluation.record(act, flight.env, params, start, steps)
+        key = jax.random.key(0)
+        history = evaluation.record(act, flight.env, params, key, start, steps)
         angle = jnp.rad2deg(jax.vmap(quaternions.error_angle)(history.quaternion[-1]))
         rate = jnp.linalg.norm(history.angular_velocity[-1], axis=-1)
         return Flown(*map(np.asarray, (start.quaternion, angle, rate)))

@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 
 from attjax import checks, programs
+from attjax.env import steps_key
 from attjax.gymnasium_task import Task, check_not_forked, outer_time_limit, random_key
 from attjax.gymnasium_vector import SlewVectorEnv
 from attjax.values import integer
@@ -80,6 +81,7 @@ class SlewEnv(Task, gymnasium.Env):
         super().reset(seed=seed if integer(seed) is None else integer(seed))
         self._set_limit(outer_time_limit(self) or self._own_limit)
         key = random_key(self.np_random)
+        self._steps_key = steps_key(key)
         observation, self._state = programs.reset(self._env, self._params, key)
         self._record()
         return np.array(observation), {}
@@ -100,7 +102,7 @@ class SlewEnv(Task, gymnasium.Env):
         self._check_reset()
         action = checks.action(action, int(self.action_space.n))
         self._state, (observation, reward, terminated, truncated, info) = programs.step(
-            self._env, self._params, self._state, action
+            self._env, self._params, self._steps_key, self._state, action
         )
         self._record()
         info = {name: np.asarray(x)[()] for name, x in info.items()}

@@ -162,6 +162,7 @@ def _note_fork():
     _forked = _forked or backends_are_initialized()
 
 
+# At import, alone of all modules: a fork is heard of only by who registered before it.
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_note_fork)
 

@@ -23,7 +23,7 @@ class GymnaxEnv(environment.Environment):
     Args:
         env: by default the paper's, ``AttitudeEnv()``.
         reward_scale: factor of the reward.
-        describe: whether ``info`` holds ``score`` and ``outcome`` of the environment too.
+        describe: whether ``info`` holds ``score``, ``torque`` and ``outcome`` too.
 
     Example:
         >>> env = GymnaxEnv()
@@ -74,7 +74,7 @@ class GymnaxEnv(environment.Environment):
         terminated = info["terminated"]
         info = {**info, "discount": 1 - terminated.astype(reward.dtype)}
         if not self.describe:
-            del info["score"], info["outcome"]
+            del info["score"], info["torque"], info["outcome"]
         return observation, state, reward * self.reward_scale, *ends, info
 
     def reset_env(self, key, params):

@@ -1,26 +1,19 @@
-"""What ``--help`` says of the settings, in how many columns, and on terminals without Greek."""
+"""What ``--help`` says of the settings, and in how many columns."""
 
 import argparse
-import codecs
 import dataclasses
 import shutil
-import sys
 import textwrap
 
 from attjax import presets
 
 MOST_COLUMNS = 100
-PLAIN = {
-    "γ": "gamma", "λ": "lambda", "ε": "epsilon", "φ": "phi", "ω": "omega", "θ": "theta",
-    "Â": "A^", "°": "deg", "²": "^2", "½": "1/2", "‖": "|", "–": "-", "−": "-", "—": "-",
-    "…": "...", "×": "x", "·": "*", "≤": "<=", "≥": ">=", "→": "->", "µ": "u", "─": "-", "━": "-",
-}  # fmt: skip
 
 
 class Formatter(argparse.RawDescriptionHelpFormatter):
     """Of the terminal's width, up to 100 columns; ``--[no-]flag`` in place of two flags."""
 
-    def __init__(self, prog):
+    def __init__(self, prog: str):
         columns = min(shutil.get_terminal_size().columns, MOST_COLUMNS)
         super().__init__(prog, max_help_position=30, width=columns - 1)
 
@@ -37,8 +30,8 @@ def meaning(field: dataclasses.Field) -> str:
     """What a setting is: symbol, meaning, unit.
 
     Example:
-        >>> from attjax.settings import Settings
-        >>> meaning(Settings.__dataclass_fields__["discount"])
+        >>> from attjax.settings import FIELDS
+        >>> meaning(FIELDS["discount"])
         'γ: discount of later rewards (Eq. 2)'
     """
     symbol, unit = field.metadata["symbol"], field.metadata["unit"]
@@ -60,7 +53,7 @@ def defaults(name: str) -> str:
     return "; ".join(f"{', '.join(names)}: {value}" for value, names in presets_of.items())
 
 
-def show(value) -> str:
+def show(value: tuple[int, ...] | bool | float | str) -> str:
     """A value as its flag takes it; yes or no for a switch.
 
     Example:
@@ -74,32 +67,3 @@ def show(value) -> str:
     if isinstance(value, int):
         return f"{value:_}" if value >= 10_000 else str(value)
     return f"{value:g}" if isinstance(value, float) else value
-
-
-def plain(text: str) -> str:
-    """The text in ASCII.
-
-    Example:
-        >>> plain("φ ≤ 0.25°")
-        'phi <= 0.25deg'
-    """
-    return text.encode("ascii", ERRORS).decode()
-
-
-def print_anywhere() -> None:
-    """Let stdout and stderr take any text: what their encoding lacks is written out in ASCII."""
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors=ERRORS)
-
-
-def _replace(error):
-    """A codec's error handler."""
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
-    lacking = error.object[error.start : error.end]
-    return "".join(PLAIN.get(character, "?") for character in lacking), error.end
-
-
-ERRORS = "attjax.plain"
-codecs.register_error(ERRORS, _replace)

@@ -7,6 +7,7 @@ import contextlib
 import os
 import re
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 
 SETTINGS = {
@@ -56,7 +57,7 @@ def pin_settings() -> None:
             jax.config.update(name, value)
 
 
-def set_variables(names) -> str:
+def set_variables(names: Iterable[str]) -> str:
     """Those of the environment's variables that are set, with their values, for an error."""
     return ", ".join(f"{name} is {os.environ[name]!r}" for name in names if name in os.environ)
 

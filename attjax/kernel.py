@@ -1,10 +1,15 @@
 """Many outputs in one pass over a batch, which XLA's CPU compiler does not do by itself."""
 
+from collections.abc import Callable
+from typing import Any, TypeVar
+
 import jax
 import jax.numpy as jnp
 
+Tree = TypeVar("Tree")
 
-def one_loop(function, *operands):
+
+def one_loop(function: Callable[..., Tree], *operands: Any) -> Tree:
     """``function(*operands)``, under ``vmap`` compiled for CPU to a single loop over the batch.
 
     XLA's CPU compiler makes a loop for each output of an elementwise computation and repeats
@@ -16,24 +21,30 @@ def one_loop(function, *operands):
     is for CPU only; it cannot be differentiated.
 
     Args:
-        function: of scalars, to a tuple of scalars of the operands' type; elementwise
+        function: of trees of scalars, to a tree of scalars of the operands' type; elementwise
             operations only, and nothing but numbers from outside.
-        operands: scalars of one floating-point type.
+        operands: trees of scalars of one floating-point type.
 
     Returns:
-        The function's tuple.
+        The function's tree.
 
     Example:
-        >>> [x.item() for x in one_loop(lambda a, b: (a + b, a - b), 3.0, 1.0)]
-        [4.0, 2.0]
+        >>> both = one_loop(lambda x: {"sum": x["a"] + x["b"], "less": x["a"] - x["b"]},
+        ...                 {"a": 3.0, "b": 1.0})
+        >>> both["sum"].item(), both["less"].item()
+        (4.0, 2.0)
     """
-    operands = [jnp.asarray(x) for x in operands]
-    arguments, outputs = len(operands), len(jax.eval_shape(function, *operands))
-    operands += operands[:1] * (outputs - arguments)
+    leaves, structure = jax.tree.flatten(operands)
+    scalars = [jnp.asarray(x) for x in leaves]
+    result = jax.tree.structure(jax.eval_shape(function, *operands))
+    arguments, outputs = len(scalars), result.num_leaves
+    scalars += scalars[:1] * (outputs - arguments)
 
     def reducer(_, current):
-        return (*function(*current[:arguments]), *current[outputs:])
+        values = function(*structure.unflatten(current[:arguments]))
+        return (*jax.tree.leaves(values), *current[outputs:])
 
-    copies = [jnp.broadcast_to(x, (2,)) for x in operands]
-    zeros = [jnp.zeros((), x.dtype) for x in operands]
-    return jax.lax.reduce(tuple(copies), tuple(zeros), reducer, (0,))[:outputs]
+    copies = [jnp.broadcast_to(x, (2,)) for x in scalars]
+    zeros = [jnp.zeros((), x.dtype) for x in scalars]
+    reduced = jax.lax.reduce(tuple(copies), tuple(zeros), reducer, (0,))
+    return result.unflatten(reduced[:outputs])

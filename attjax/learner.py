@@ -12,11 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 from flax import struct
-from jax.sharding import PartitionSpec
 
-from attjax import vector
+from attjax import sharding
+from attjax import vector as batch
 from attjax.networks import Policy
-from attjax.settings import Settings
+from attjax.settings import PPO, Settings
+from attjax.sharding import SHARED, SPLIT
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,15 +64,7 @@ class Setup:
     @property
     def envs_per_device(self) -> int:
         """Spacecraft of one device."""
-        return self.settings.num_envs // self.num_devices
-
-    def param_axes(self, env_params):
-        """For ``vmap``: 0 for parameters in which the spacecraft differ, None for the others."""
-        return jax.tree.map(
-            lambda x, default: 0 if np.ndim(x) > np.ndim(default) else None,
-            env_params,
-            self.env.default_params,
-        )
+        return self.settings.ppo.num_envs // self.num_devices
 
 
 @struct.dataclass
@@ -100,20 +93,11 @@ class Learner:
     update: chex.Array
 
 
-def on_devices(setup: Setup, function, in_specs, out_specs):
-    """``function`` on each device's part of its arguments, with the axis ``vector.AXIS``."""
-    mesh = vector.mesh(setup.num_devices)
-    return jax.shard_map(
-        function, mesh=mesh, in_specs=in_specs, out_specs=out_specs, check_vma=False
-    )
-
-
-SHARED, SPLIT = PartitionSpec(), PartitionSpec(vector.AXIS)
 LEARNER_SPECS = Learner(SHARED, SHARED, SPLIT, SPLIT, SPLIT, SPLIT, SHARED, SHARED)
 """What is the same on all devices, and what is split."""
 
 
-def optimizer(settings: Settings) -> optax.GradientTransformation:
+def optimizer(settings: PPO) -> optax.GradientTransformation:
     """Adam, annealed linearly over the whole run, with optional gradient clipping.
 
     It is given a network's gradient as one vector: dozens of small arrays cost more to start on
@@ -125,16 +109,15 @@ def optimizer(settings: Settings) -> optax.GradientTransformation:
     return optax.chain(clip, optax.adam(functools.partial(learning_rate, settings)))
 
 
-def learning_rate(settings: Settings, gradient_step) -> chex.Array:
+def learning_rate(settings: PPO, gradient_step: chex.Array | int) -> chex.Array:
     """Adam's learning rate in a gradient step, annealed linearly over the whole run."""
-    gradient_steps = settings.num_updates * settings.passes * settings.minibatches
     schedule = optax.linear_schedule(
-        settings.learning_rate, settings.final_learning_rate, gradient_steps
+        settings.learning_rate, settings.final_learning_rate, settings.gradient_steps
     )
     return schedule(gradient_step)
 
 
-def entropy_coefficient(settings: Settings, update) -> chex.Array:
+def entropy_coefficient(settings: PPO, update: chex.Array) -> chex.Array:
     """Weight of the entropy bonus in an update, annealed linearly over the whole run."""
     schedule = optax.linear_schedule(
         settings.entropy_coefficient, settings.final_entropy_coefficient, settings.num_updates
@@ -143,25 +126,27 @@ def entropy_coefficient(settings: Settings, update) -> chex.Array:
 
 
 @functools.partial(jax.jit, static_argnames="setup")
-def init(setup: Setup, env_params, key: chex.PRNGKey) -> Learner:
+def init(setup: Setup, env_params: chex.ArrayTree, key: chex.PRNGKey) -> Learner:
     """A learner at its start, for parameters as :class:`Setup` describes them."""
     start = functools.partial(_init_on_device, setup)
-    return on_devices(setup, start, (SHARED, SHARED), LEARNER_SPECS)(env_params, key)
+    on_device = sharding.on_devices(setup.num_devices, start, (SHARED, SHARED), LEARNER_SPECS)
+    return on_device(env_params, key)
 
 
 def _init_on_device(setup, env_params, key):
+    env, settings = setup.env, setup.settings
     key, policy_key, value_key, start_key = jax.random.split(key, 4)
-    start_key = jax.random.fold_in(start_key, jax.lax.axis_index(vector.AXIS))
+    start_key = jax.random.fold_in(start_key, jax.lax.axis_index(sharding.AXIS))
     keys = jax.random.split(start_key, setup.envs_per_device)
-    start = jax.vmap(functools.partial(_start, setup), (0, setup.param_axes(env_params)))
-    observation, states = start(keys, env_params)
-    context = setup.env.context(params_of(setup, env_params, 0))
+    start = functools.partial(_start, env, settings.task.stagger_episodes)
+    observation, states = jax.vmap(start, (0, batch.param_axes(env, env_params)))(keys, env_params)
+    context = env.context(batch.params_of(env, env_params, 0))
     params = setup.policy.init(policy_key, value_key, observation[0], context)
+    adam = optimizer(settings.ppo)
     return Learner(
         params=params,
         optimizer={
-            name: optimizer(setup.settings).init(jax.flatten_util.ravel_pytree(p)[0])
-            for name, p in params.items()
+            name: adam.init(jax.flatten_util.ravel_pytree(p)[0]) for name, p in params.items()
         },
         states=states,
         observation=observation,
@@ -172,16 +157,11 @@ def _init_on_device(setup, env_params, key):
     )
 
 
-def _start(setup, key, env_params):
-    observation, state = setup.env.reset(key, env_params)
-    if setup.settings.stagger_episodes:
+def _start(env, is_staggered, key, env_params):
+    """The first episode of a spacecraft; if staggered, at a random time of it."""
+    observation, state = env.reset(key, env_params)
+    if is_staggered:
         limit = env_params.max_steps_in_episode
         time = jax.random.randint(jax.random.fold_in(key, 0), (), 0, limit)
         state = state.replace(time=jnp.maximum(state.time, time))
     return observation, state
-
-
-def params_of(setup, env_params, row):
-    """The parameters of one of a device's spacecraft."""
-    axes = setup.param_axes(env_params)
-    return jax.tree.map(lambda x, axis: x if axis is None else x[row], env_params, axes)

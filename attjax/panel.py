@@ -3,30 +3,17 @@
 import math
 import time
 
+from rich.console import Console, ConsoleOptions, RenderResult
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-EPISODE_COLUMN = (
-    ("return", "episode_return", ",.0f"),
-    ("success", "success_rate", ".1%"),
-    ("terminal error", "terminal_error_deg", ".3g"),
-)
-UPDATE_COLUMNS = (
-    (
-        ("entropy", "entropy", ".3g"),
-        ("KL", "approximate_kl", ".2g"),
-        ("clipped", "clip_fraction", ".1%"),
-    ),
-    (
-        ("value loss", "value_loss", ".3g"),
-        ("explained var.", "explained_variance", ".3g"),
-        ("overspeed", "overspeed_rate", ".1%"),
-    ),
-)
-"""What the panel shows: label, column of metrics.csv, format."""
+from attjax import metrics
+from attjax.progress_status import Status
 
 WIDTHS = (25, 16, 24)
+"""Of the columns that cells have their places in, without the course that the first one draws."""
+
 GAP = "  "
 MOST_TREND, LEAST_BAR = 24, 8
 LEVELS = "▁▂▃▄▅▆▇█"
@@ -36,14 +23,15 @@ class Panel:
     """The run's state in four lines, for rich; narrow terminals get less of it.
 
     Args:
-        status: a ``progress.Status``.
+        status: what it shows.
         is_stopping: whether the run ends after this block.
     """
 
-    def __init__(self, status, is_stopping: bool = False):
+    def __init__(self, status: Status, is_stopping: bool = False) -> None:
         self._status, self._is_stopping = status, is_stopping
 
-    def __rich_console__(self, console, options):
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """The panel's lines, at most two columns narrower than the terminal."""
         width = options.max_width - 2  # Ctrl-C shows as ^C at its end, which must not wrap
         state = self._status.describe(time.monotonic())
         if self._is_stopping:
@@ -54,10 +42,13 @@ class Panel:
         free = width - sum(WIDTHS[:count]) - (count - 1) * len(GAP) - 1
         has_blocks = options.encoding.startswith("utf")
         trend_width = max(min(free, MOST_TREND), 0) if has_blocks else 0
-        for row, text in enumerate(_episode_cells(self._status, trend_width)):
-            for column, size in zip(UPDATE_COLUMNS[: count - 1], WIDTHS[1:]):
+        placed = {metric.cell.place: metric for metric in metrics.METRICS if metric.cell}
+        rows = 1 + max(row for _, row in placed)
+        first = [placed.get((0, row)) for row in range(rows)]
+        for row, text in enumerate(_first_cells(self._status, first, trend_width)):
+            for column in range(1, count):
                 text.append(GAP)
-                text.append_text(_cell(self._status, column[row], size))
+                text.append_text(_cell(self._status, placed.get((column, row)), WIDTHS[column]))
             text.truncate(width)
             yield text
 
@@ -73,25 +64,28 @@ def _bar(status, state, width):
     return grid
 
 
-def _episode_cells(status, trend_width):
-    if "success_rate" not in status.known:
+def _first_cells(status, column, trend_width):
+    if not status.has_episodes:
         width = WIDTHS[0] + (trend_width + 1 if trend_width else 0)
-        words = ("no whole episode", "has ended yet", "")
-        if "episodes" not in status.known:
-            words = ("the first block runs", "", "")
-        yield from (_text(word.ljust(width)) for word in words)
+        words = ("no whole episode", "has ended yet")
+        if not status.has_blocks:
+            words = ("the first block runs",)
+        blank = ("",) * (len(column) - len(words))
+        yield from (_text(word.ljust(width)) for word in (*words, *blank))
         return
-    for entry in EPISODE_COLUMN:
-        text = _cell(status, entry, WIDTHS[0])
+    for metric in column:
+        text = _cell(status, metric, WIDTHS[0])
         if trend_width:
-            text.append(" " + trend(status.history[entry[1]], trend_width), "cyan")
+            values = status.history[metric.name] if metric else []
+            text.append(" " + trend(values, trend_width), "cyan")
         yield text
 
 
-def _cell(status, entry, width):
-    label, name, form = entry
-    shown = value(status, name, form)
-    return _text(label, "dim").append(shown.rjust(width - len(label)))
+def _cell(status, metric, width):
+    if metric is None:
+        return _text(" " * width)
+    label = metric.cell.label
+    return _text(label, "dim").append(status.shown(metric).rjust(width - len(label)))
 
 
 def _text(content, style=""):
@@ -116,9 +110,3 @@ def trend(values: list[float], width: int) -> str:
     span = (high - low) or 1
     levels = [int((x - low) / span * (len(LEVELS) - 1)) for x in shown]
     return "".join(LEVELS[level] for level in levels).ljust(width)
-
-
-def value(status, name: str, form: str) -> str:
-    """The newest value of a column, with its unit; a dash where there is none."""
-    unit = "°" if name.endswith("_deg") else ""
-    return format(status.known[name], form) + unit if name in status.known else "–"

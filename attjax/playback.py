@@ -39,10 +39,11 @@ def page(
         seed: of the random slews, as in :func:`attjax.evaluation.fly`.
         checkpoint: where the policy comes from, in a word, to be shown; None: not shown.
     """
-    start = _starts(env, params, seed)
+    key = jax.random.key(seed)
+    start = _starts(env, params, key)
     steps = int(params.max_steps_in_episode)
     histories = [
-        _samples(start, evaluation.record(controller, env, params, start, steps))
+        _samples(start, evaluation.record(controller, env, params, key, start, steps))
         for controller in controllers.values()
     ]
     content = {
@@ -68,8 +69,8 @@ def page(
     return template.fill("playback.html", style=style, script=scripts, flights=flights)
 
 
-def _starts(env, params, seed) -> EnvState:
-    random = evaluation.random_slews(env, params, jax.random.key(seed), RANDOM_SLEWS)[1]
+def _starts(env, params, key) -> EnvState:
+    random = evaluation.random_slews(env, params, key, RANDOM_SLEWS)[1]
     return jax.tree.map(lambda *x: jnp.concatenate(x), evaluation.table_5_slews(), random)
 
 

@@ -65,27 +65,21 @@ class Flight:
     def record(self, start: EnvState):
         """Time in s, (steps,), and the history of slews from the given states."""
         steps = int(self.params.max_steps_in_episode)
-        history = evaluation.record(self.controller, self.env, self.params, start, steps)
+        key = jax.random.key(self.seed)
+        history = evaluation.record(self.controller, self.env, self.params, key, start, steps)
         return np.arange(1, steps + 1) * self.env.control_period, history
 
 
-def write_all(flight: Flight, folder: Path, metrics: list[dict]) -> list[Path]:
-    """Write every figure into the folder, the learning curve too where there is one to draw.
-
-    ``metrics`` are rows of a run's metrics.csv, as strings; a short run ends before an episode
-    does, and then they say nothing of any.
-    """
+def write_all(flight: Flight, folder: Path) -> list[Path]:
+    """Write every figure of a flight into the folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    paths = [
+    return [
         *slews(flight, folder),
         final_seconds(flight, folder),
         error_histories(flight, folder),
         distributions(flight, folder),
         settling(flight, folder),
     ]
-    if any(row["episode_return"] for row in metrics):
-        paths.append(learning_curve(metrics, flight.is_the_papers, folder))
-    return paths
 
 
 @canvas.own_style()
@@ -221,27 +215,3 @@ def settling(flight: Flight, folder: Path) -> Path:
     axis.set_title(f"Settling at {flight.hz}")
     axis.legend()
     return canvas.save(figure, folder, "settling")
-
-
-@canvas.own_style()
-def learning_curve(metrics: list[dict], is_the_papers: bool, folder: Path) -> Path:
-    """Return, success and terminal error over agent steps, from a run's metrics."""
-    rows = [row for row in metrics if row["episode_return"]]
-    steps = [int(row["agent_steps"]) / 1e6 for row in rows]
-    columns = (
-        ("episode_return", "return (Eq. 12–13)"),
-        ("success_rate", "success rate"),
-        ("terminal_error_deg", "terminal error (°)"),
-    )
-    figure, axes = canvas.subplots(3, 1, figsize=(7, 7), sharex=True)
-    for axis, (name, label) in zip(axes, columns):
-        axis.plot(steps, [float(row[name]) for row in rows], "k", linewidth=1)
-        axis.set_ylabel(label)
-        axis.grid(alpha=0.3)
-    if is_the_papers:
-        axes[0].axhline(2500, color="tab:red", linestyle="--", label="the paper's plateau")
-        axes[0].legend()
-    axes[2].set_yscale("log")
-    axes[2].set_xlabel("agent steps (millions)")
-    axes[0].set_title("Learning: training episodes")
-    return canvas.save(figure, folder, "learning_curve")

@@ -4,24 +4,30 @@ Works with any environment of ``AttitudeEnv``'s protocol.
 """
 
 import functools
+from typing import Any
 
 import chex
 import jax
 import jax.numpy as jnp
 
-from attjax import losses, vector
+from attjax import losses, sharding
+from attjax import vector as batch
 from attjax.descent import Sample, optimize
-from attjax.learner import LEARNER_SPECS, SHARED, Learner, Setup, on_devices
+from attjax.learner import LEARNER_SPECS, Learner, Setup
 from attjax.rollout import Step, encode, episode_sums, rollout
+from attjax.settings import PPO
+from attjax.sharding import AXIS, SHARED
 
 
 @functools.partial(
     jax.jit,
     static_argnames="setup",
     donate_argnames="learner",
-    compiler_options=vector.COMPILER_OPTIONS,
+    compiler_options=sharding.COMPILER_OPTIONS,
 )
-def train_block(setup: Setup, env_params, learner: Learner, num_updates):
+def train_block(
+    setup: Setup, env_params: chex.ArrayTree, learner: Learner, num_updates: int
+) -> tuple[Learner, dict]:
     """Run ``num_updates`` updates (traced, so that every block shares one compilation).
 
     Returns:
@@ -31,9 +37,8 @@ def train_block(setup: Setup, env_params, learner: Learner, num_updates):
     """
     block = functools.partial(_block_on_device, setup)
     specs = (SHARED, LEARNER_SPECS, SHARED)
-    return on_devices(setup, block, specs, (LEARNER_SPECS, SHARED))(
-        env_params, learner, num_updates
-    )
+    on_device = sharding.on_devices(setup.num_devices, block, specs, (LEARNER_SPECS, SHARED))
+    return on_device(env_params, learner, num_updates)
 
 
 def _block_on_device(setup, env_params, learner, num_updates):
@@ -56,7 +61,9 @@ def _block_on_device(setup, env_params, learner, num_updates):
 
 
 @functools.partial(jax.jit, static_argnames="setup")
-def update(setup: Setup, env_params, learner: Learner):
+def update(
+    setup: Setup, env_params: chex.ArrayTree, learner: Learner
+) -> tuple[Learner, dict, dict]:
     """One update on one device: rollout, advantages, N passes of minibatch gradient steps.
 
     Jitted so that it is traced once, for the shapes of its metrics and for the block's loop.
@@ -67,36 +74,40 @@ def update(setup: Setup, env_params, learner: Learner):
     """
     learner, steps = rollout(setup, env_params, learner)
     samples = with_advantages(setup, env_params, learner, steps)
-    learner, losses_ = optimize(setup, learner, samples)
+    learner, losses_ = optimize(
+        setup.policy, setup.settings.ppo, learner, samples, setup.num_devices
+    )
     not_finite = {
         "observations": _any_not_finite(steps.inputs.features),
         "rewards": _any_not_finite(steps.reward),
         "losses": _any_not_finite(losses_),
         "parameters": _any_not_finite(learner.params),
     }
-    finite = jax.tree.map(lambda x: ~jax.lax.pmax(x, vector.AXIS), not_finite)
+    finite = jax.tree.map(lambda x: ~jax.lax.pmax(x, AXIS), not_finite)
     metrics = {
-        "losses": jax.lax.pmean(losses_, vector.AXIS),
-        "episodes": jax.lax.psum(episode_sums(setup, steps), vector.AXIS),
+        "losses": jax.lax.pmean(losses_, AXIS),
+        "episodes": jax.lax.psum(episode_sums(steps, setup.slices), AXIS),
     }
     return learner.replace(update=learner.update + 1), metrics, finite
 
 
-def with_advantages(setup, env_params, learner, steps: Step) -> Sample:
+def with_advantages(
+    setup: Setup, env_params: chex.ArrayTree, learner: Learner, steps: Step
+) -> Sample:
     """Values after the rollout, its advantages and the value targets.
 
     The values are computed step by step, as a step of all spacecraft fits the cache.
     """
-    settings = setup.settings
+    env, policy, settings = setup.env, setup.policy, setup.settings
 
     def value(features):
-        return setup.policy.value(learner.params, features)
+        return policy.value(learner.params, features)
 
     def value_of(observation):
-        return value(encode(setup, env_params, observation).features)
+        return value(encode(env, policy, env_params, observation).features)
 
     values = jax.lax.map(value, steps.inputs.features)
-    if settings.time_limit_terminates:
+    if settings.task.time_limit_terminates:
         terminated = steps.terminated | steps.truncated
         next_values = jnp.concatenate([values[1:], value_of(learner.observation)[None]])
     else:
@@ -108,8 +119,8 @@ def with_advantages(setup, env_params, learner, steps: Step) -> Sample:
         next_values,
         terminated,
         steps.terminated | steps.truncated,
-        discounts(setup, env_params),
-        settings.gae_lambda,
+        discounts(env, env_params, settings.ppo, setup.envs_per_device),
+        settings.ppo.gae_lambda,
     )
     samples = Sample(
         inputs=steps.inputs,
@@ -121,18 +132,17 @@ def with_advantages(setup, env_params, learner, steps: Step) -> Sample:
     return jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), samples)
 
 
-def discounts(setup, env_params) -> chex.Array:
-    """(envs_per_device,) discount of an agent step, or a scalar where it is the same for all."""
-    settings = setup.settings
+def discounts(env: Any, env_params: chex.ArrayTree, settings: PPO, count: int) -> chex.Array:
+    """(count,) discount of an agent step of each spacecraft; a scalar where it is the same."""
     if settings.discount_period == 0:
         return jnp.array(settings.discount, float)
 
     def discount(env_params):
-        period = setup.env.context(env_params).control_period
+        period = env.context(env_params).control_period
         return settings.discount ** (period / settings.discount_period)
 
-    axes = setup.param_axes(env_params)
-    return jax.vmap(discount, (axes,), axis_size=setup.envs_per_device)(env_params)
+    axes = batch.param_axes(env, env_params)
+    return jax.vmap(discount, (axes,), axis_size=count)(env_params)
 
 
 def _any_not_finite(tree):

@@ -9,7 +9,7 @@ import functools
 import jax
 import jax.numpy as jnp
 
-from attjax import vector
+from attjax import sharding, vector
 
 
 @functools.partial(jax.jit, static_argnames="env")
@@ -20,14 +20,19 @@ def reset(env, params, key):
 
 
 @functools.partial(jax.jit, static_argnames="env", donate_argnames="state")
-def step(env, params, state, action):
+def step(env, params, key, state, action):
     """One agent step without reset; the state is donated.
+
+    Args:
+        env, params, action: as for the environment.
+        key: of all steps of the episode; each folds its time in.
+        state: before the step.
 
     Returns:
         The state, and observation, reward, terminated, truncated and what describes the
         spacecraft after the step.
     """
-    key = jax.random.key(0)  # a step without reset draws nothing
+    key = jax.random.fold_in(key, state.time)
     observation, state, reward, terminated, info = env.step_env(key, state, action, params)
     return state, (_single(observation), reward, terminated, info["truncated"], _described(info))
 
@@ -51,7 +56,7 @@ def choose(mask, new, old):
     jax.jit,
     static_argnames="env",
     donate_argnames="states",
-    compiler_options=vector.COMPILER_OPTIONS,
+    compiler_options=sharding.COMPILER_OPTIONS,
 )
 def step_batch(env, params, key, states, actions):
     """One agent step of all spacecraft, ended episodes restarted; the states are donated.
@@ -72,7 +77,7 @@ def step_batch(env, params, key, states, actions):
     jax.jit,
     static_argnames="env",
     donate_argnames="states",
-    compiler_options=vector.COMPILER_OPTIONS,
+    compiler_options=sharding.COMPILER_OPTIONS,
 )
 def step_batch_later_reset(env, params, key, states, actions, ended):
     """One agent step of the spacecraft that have not ended, and a new episode for the others.

@@ -1,21 +1,19 @@
 """How a training run shows itself: a panel that redraws itself on a terminal, lines elsewhere."""
 
-import collections
 import time
+from collections.abc import Iterable
+from typing import Any, Self
 
 from rich.console import Console
 from rich.live import Live
 
-from attjax import panel
-
-WINDOW_S = 60.0
-"""Speed and remaining time come from the blocks of so many seconds."""
+from attjax.panel import Panel
+from attjax.progress_status import Status, line
+from attjax.signals import StopSignals
 
 REDRAWS_PER_S = 2
 LEAST_PAUSE_S, PAUSE_SHARE = 5.0, 0.01
 """Between two lines: so long, and that share of the time before; so a day makes some 600 lines."""
-
-NONE_YET = "no whole episode has ended yet"
 
 
 class Progress:
@@ -31,7 +29,13 @@ class Progress:
         stop: has ``received``, not None once the run has been asked to stop.
     """
 
-    def __init__(self, total_steps: int, done_steps: int, rows=(), stop=None):
+    def __init__(
+        self,
+        total_steps: int,
+        done_steps: int,
+        rows: Iterable[dict[str, str]] = (),
+        stop: StopSignals | None = None,
+    ) -> None:
         self._status = Status(total_steps, done_steps)
         for row in rows:
             self._status.learn({name: float(cell) for name, cell in row.items() if cell})
@@ -41,7 +45,7 @@ class Progress:
         self._live = Live(self, console=self._console, refresh_per_second=REDRAWS_PER_S)
         self._is_shown, self._next_line = True, 0.0
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         self._start = time.monotonic()
         self._status.start(self._start)
         if self._is_live:
@@ -50,13 +54,13 @@ class Progress:
             self._console.show_cursor(True)
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         if self._is_live:
             self._live.stop()
         elif not self._is_shown:
             self._print()
 
-    def show(self, row: dict) -> None:
+    def show(self, row: dict[str, Any]) -> None:
         """Show a row of metrics."""
         now = time.monotonic()
         self._status.add(row, now)
@@ -69,86 +73,6 @@ class Progress:
         print(line(self._status, time.monotonic()), file=self._console.file, flush=True)
         self._is_shown = True
 
-    def __rich__(self):
+    def __rich__(self) -> Panel:
         is_stopping = self._stop is not None and self._stop.received is not None
-        return panel.Panel(self._status, is_stopping)
-
-
-class Status:
-    """What the rows so far say of a run.
-
-    Attributes:
-        known: the newest value of each column that has had one.
-        history: all values, of the columns that the panel draws.
-    """
-
-    def __init__(self, total_steps: int, done_steps: int):
-        self.total, self.steps, self.known = total_steps, done_steps, {}
-        self.history = {name: [] for _, name, _ in panel.EPISODE_COLUMN}
-        self._marks = collections.deque()
-
-    def start(self, now: float) -> None:
-        """Start the clock."""
-        self._marks.append((now, self.steps))
-
-    def add(self, row: dict, now: float) -> None:
-        """Take in a row of metrics."""
-        self.steps = row["agent_steps"]
-        self.learn({name: value for name, value in row.items() if value is not None})
-        self._marks.append((now, self.steps))
-        while self._marks[1][0] < now - WINDOW_S and len(self._marks) > 2:
-            self._marks.popleft()
-
-    def learn(self, values: dict) -> None:
-        """Take in what is not empty in a row."""
-        self.known |= values
-        for name in self.history.keys() & values.keys():
-            self.history[name].append(values[name])
-
-    def describe(self, now: float) -> str:
-        """Where it stands, how fast it is and how long it will take."""
-        (since, steps), (until, _) = self._marks[0], self._marks[-1]
-        speed = remaining = "–"
-        if self.steps > steps and until > since:
-            rate = (self.steps - steps) / (until - since)
-            speed = _short(rate)
-            remaining = _duration(max((self.total - self.steps) / rate - (now - until), 0))
-        done = f"{self.steps / self.total:.1%}  {_short(self.steps)}/{_short(self.total)} steps"
-        return f"{done}  {speed}/s  ETA {remaining}"
-
-
-def line(status: Status, now: float) -> str:
-    """The run's state in a line; what is not known is left out."""
-    parts = [f"{status.describe(now):<44}"]
-    if "episodes" in status.known and "success_rate" not in status.known:
-        parts.append(NONE_YET)
-    for label, name, form in (*panel.EPISODE_COLUMN, panel.UPDATE_COLUMNS[0][0]):
-        if name in status.known:
-            parts.append(f"{label} {panel.value(status, name, form)}")
-    return "  ".join(parts)
-
-
-def _short(x):
-    """Three digits and a unit.
-
-    Example:
-        >>> [_short(x) for x in (256, 999_900, 40_000_000)]
-        ['256', '1M', '40M']
-    """
-    for scale, unit in ((1, ""), (1e3, "k"), (1e6, "M"), (1e9, "G")):
-        text = f"{x / scale:.3g}"
-        if float(text) < 1000:
-            return text + unit
-    return f"{x / 1e12:.3g}T"
-
-
-def _duration(seconds):
-    """Hours, minutes and seconds.
-
-    Example:
-        >>> _duration(59.7), _duration(3723)
-        ('1:00', '1:02:03')
-    """
-    minutes, seconds = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
+        return Panel(self._status, is_stopping)

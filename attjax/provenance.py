@@ -30,8 +30,8 @@ def of_run(config: Config, update: int, newest: int) -> Origin:
     settings = config.settings
     text = f"preset {config.preset}{_changes(config)}, seed {config.seed}, update {update} of "
     overridden = (f"update {update}, not the newest, {newest}",) if update != newest else ()
-    text += str(settings.num_updates)
-    return Origin(text, tuple(sorted(set(settings.frameskips))), config.spacecraft, overridden)
+    text += str(settings.ppo.num_updates)
+    return Origin(text, tuple(sorted(set(settings.task.frameskips))), config.spacecraft, overridden)
 
 
 def _changes(config):
@@ -39,7 +39,7 @@ def _changes(config):
     preset = presets.PRESETS.get(config.preset)
     if preset is None:
         return " (unknown)"
-    before, after = dataclasses.asdict(preset), dataclasses.asdict(config.settings)
+    before, after = preset.flat, config.settings.flat
     changes = [f"{name} {_value(x)}" for name, x in after.items() if x != before[name]]
     return f" with {', '.join(changes)}" * bool(changes)
 

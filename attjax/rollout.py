@@ -1,14 +1,17 @@
 """Rollouts: many spacecraft fly under the current policy."""
 
+from typing import Any
+
 import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import losses, vector
-from attjax.learner import Learner, params_of
-from attjax.networks import Inputs
+from attjax import losses, sharding
+from attjax import vector as batch
+from attjax.learner import Learner, Setup
+from attjax.networks import Inputs, Policy
 
 
 @struct.dataclass
@@ -27,7 +30,7 @@ class Step:
     outcome: dict[str, chex.Array]
 
 
-def rollout(setup, env_params, learner) -> tuple[Learner, Step]:
+def rollout(setup: Setup, env_params: chex.ArrayTree, learner: Learner) -> tuple[Learner, Step]:
     """``rollout_length`` steps of all spacecraft under the current policy.
 
     Most sample their actions. Those of :func:`greedy_rows` take the most probable one, as in
@@ -35,24 +38,25 @@ def rollout(setup, env_params, learner) -> tuple[Learner, Step]:
     where several actions are about equally probable. The advantage is negative there, and the
     update lowers the action. It takes these steps as if they had been sampled.
     """
-    greedy = greedy_rows(setup)
+    env, policy, length = setup.env, setup.policy, setup.settings.ppo.rollout_length
+    greedy = greedy_rows(setup.envs_per_device, setup.settings.ppo.greedy_share)
     key, device_key = jax.random.split(learner.key)
-    device_key = jax.random.fold_in(device_key, jax.lax.axis_index(vector.AXIS))
+    device_key = jax.random.fold_in(device_key, jax.lax.axis_index(sharding.AXIS))
     uniform_key, flight_key = jax.random.split(device_key)
 
     def step(learner, random):
         uniform, keys = random
-        inputs = encode(setup, env_params, learner.observation)
-        log_probabilities = setup.policy.log_probabilities(learner.params, inputs)
+        inputs = encode(env, policy, env_params, learner.observation)
+        log_probabilities = policy.log_probabilities(learner.params, inputs)
         sampled = sample(log_probabilities, uniform)
         most_probable = first_row(log_probabilities == jnp.max(log_probabilities, axis=0))
         action = jnp.where(greedy, most_probable, sampled)
-        learner, results = fly(setup, env_params, learner, action, keys)
+        learner, results = fly(env, env_params, learner, action, keys)
+        results["reward"] *= setup.settings.task.reward_scale
         log_probability = losses.pick(log_probabilities, action)
         return learner, Step(inputs, action, log_probability, **results)
 
     # Drawn all at once: a small draw costs as much to start as to make.
-    length = setup.settings.rollout_length
     shape = (length, setup.envs_per_device)
     uniform = jax.random.uniform(uniform_key, shape, learner.score.dtype)
     random = (uniform, jax.random.split(flight_key, (length, 2)))
@@ -60,34 +64,31 @@ def rollout(setup, env_params, learner) -> tuple[Learner, Step]:
     return learner.replace(key=key), steps
 
 
-def fly(setup, env_params, learner, action, keys) -> tuple[Learner, dict]:
+def fly(
+    env: Any,
+    env_params: chex.ArrayTree,
+    learner: Learner,
+    action: chex.Array,
+    keys: chex.PRNGKey,
+) -> tuple[Learner, dict]:
     """One agent step of all spacecraft, ended episodes restarted; and its part of a Step.
 
     ``keys`` are two, of the steps and of the restarts.
     """
-    step_key, restart_key = keys
-    step_keys = jax.random.split(step_key, len(action))
-    step_env = jax.vmap(setup.env.step_env, (0, 0, 0, setup.param_axes(env_params)))
-    observation, states, reward, terminated, info = step_env(
-        step_keys, learner.states, action, env_params
+    observation, states, reward, terminated, truncated, info = batch.step_and_restart(
+        env, env_params, keys, learner.states, action
     )
     score = learner.score + info["score"]
-    ended = terminated | info["truncated"]
+    ended = terminated | truncated
     results = {
-        "reward": reward * setup.settings.reward_scale,
+        "reward": reward,
         "terminated": terminated,
-        "truncated": info["truncated"],
-        "final_observation": observation,
+        "truncated": truncated,
+        "final_observation": info["final_observation"],
         "score": score,
         "is_whole": learner.is_whole,
         "outcome": info["outcome"],
     }
-    observation, states = vector.restart(
-        lambda key, row: setup.env.reset(key, params_of(setup, env_params, row)),
-        restart_key,
-        ended,
-        (observation, states),
-    )
     learner = learner.replace(
         states=states,
         observation=observation,
@@ -117,23 +118,28 @@ def first_row(is_candidate) -> chex.Array:
     return jnp.min(jnp.where(is_candidate, jnp.arange(rows)[:, None], rows - 1), axis=0)
 
 
-def greedy_rows(setup) -> np.ndarray:
-    """(envs_per_device,) bool, who acts greedily: ``greedy_share`` of them, spread evenly."""
-    rows = np.arange(setup.envs_per_device + 1)
-    return np.diff(np.floor(rows * setup.settings.greedy_share)) > 0
+def greedy_rows(count: int, share: float) -> np.ndarray:
+    """(count,) bool, who of the spacecraft acts greedily: a share of them, spread evenly.
+
+    Example:
+        >>> greedy_rows(8, 0.25).nonzero()[0].tolist()
+        [3, 7]
+    """
+    return np.diff(np.floor(np.arange(count + 1) * share)) > 0
 
 
-def encode(setup, env_params, observation) -> Inputs:
+def encode(env: Any, policy: Policy, env_params: chex.ArrayTree, observation: chex.Array) -> Inputs:
     """Network inputs of a device's (envs, size) observations, each in its own context."""
 
     def encode_one(observation, env_params):
-        return setup.policy.encode(observation, setup.env.context(env_params))
+        return policy.encode(observation, env.context(env_params))
 
-    return jax.vmap(encode_one, (0, setup.param_axes(env_params)))(observation, env_params)
+    axes = batch.param_axes(env, env_params)
+    return jax.vmap(encode_one, (0, axes))(observation, env_params)
 
 
-def episode_sums(setup, steps: Step) -> dict[str, chex.Array]:
-    """Sums over the whole episodes that ended in a rollout, one a group."""
+def episode_sums(steps: Step, groups: list[slice]) -> dict[str, chex.Array]:
+    """Sums over the whole episodes that ended in a rollout, one for each group of spacecraft."""
     ended = steps.is_whole & (steps.terminated | steps.truncated)
     ended = ended.astype(steps.score.dtype)
     columns = {
@@ -143,6 +149,5 @@ def episode_sums(setup, steps: Step) -> dict[str, chex.Array]:
         **{name: ended * x for name, x in steps.outcome.items()},
     }
     return {
-        name: jnp.stack([jnp.sum(x[:, part]) for part in setup.slices])
-        for name, x in columns.items()
+        name: jnp.stack([jnp.sum(x[:, part]) for part in groups]) for name, x in columns.items()
     }

@@ -11,11 +11,11 @@ import json
 import operator
 import os
 import re
-import sys
 import uuid
 from pathlib import Path
 
 from attjax import belongings, settings, specification
+from attjax.errors import UserError, warning_line
 from attjax.settings import Settings
 from attjax.specification import LM50, Spacecraft
 
@@ -24,12 +24,12 @@ try:
 except ImportError:  # Windows, where runs are not kept apart
     fcntl = None
 
-FORMAT = 5
+FORMAT = 6
 CONFIG, METRICS = belongings.CONFIG, belongings.METRICS
 LOST = "lost+found"
 
 
-class FolderError(Exception):
+class FolderError(UserError):
     """A run folder cannot be used; the message is one line for the user."""
 
 
@@ -48,7 +48,7 @@ class Config:
 
     def __post_init__(self):
         object.__setattr__(self, "seed", operator.index(self.seed))
-        longest = max(self.settings.frameskips)
+        longest = max(self.settings.task.frameskips)
         if self.spacecraft.max_steps(longest) < 1:
             raise ValueError(
                 f"frameskips holds {longest}; in {self.spacecraft.duration} s, the duration of an "
@@ -106,7 +106,7 @@ def _lock(folder):
             ) from None
         except OSError as error:
             reason = f"is not protected from a second train.py: {error.strerror or error}"
-            print(f"train.py: warning: {folder} {reason}", file=sys.stderr)
+            warning_line(f"{folder} {reason}")
             return lock
         # Who held it may have ended, and removed the file, since it was opened here.
         with contextlib.suppress(FileNotFoundError):
@@ -195,6 +195,7 @@ def read_config(folder: Path) -> Config:
         raise FolderError(f"{folder} is no attjax checkpoint: it has no {CONFIG}")
     content = _read_json(path)
     try:
+        content = UPGRADES.get(content["format"], dict)(content)
         if content["format"] != FORMAT:
             raise FolderError(
                 f"{path} has format {content['format']}; this version of attjax reads {FORMAT}"
@@ -207,6 +208,16 @@ def read_config(folder: Path) -> Config:
         )
     except (ValueError, KeyError, TypeError, OverflowError) as error:
         raise FolderError(f"{path} cannot be read: {error!r}") from None
+
+
+def _by_subject(content):
+    """Format 5 had the settings in one table."""
+    by_subject = dataclasses.asdict(settings.from_flat(content["settings"]))
+    return content | {"format": 6, "settings": by_subject}
+
+
+UPGRADES = {5: _by_subject}
+"""What makes the content of an earlier format one of the present format."""
 
 
 def _read_json(path):

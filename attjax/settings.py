@@ -1,70 +1,24 @@
-"""Everything that defines a training run, in one flat frozen dataclass.
+"""Everything that defines a training run, by subject, composed into one frozen dataclass.
 
-This module imports nothing heavy, so that ``--help`` is instant.
+Names are unique over the subjects, so that flags, TOML files and keyword arguments need no more
+than a name. This module imports nothing heavy, so that ``--help`` is instant.
 """
 
 import dataclasses
 import functools
-import math
 
-from attjax import user_functions
-from attjax.values import plain
-
-SEED = {"low": 0, "below": 2**32}
-FRAMESKIP = {"low": 0, "below": 10_500}
-"""Limits of each, as in :func:`setting`."""
+from attjax.fields import FRAMESKIP, GROUPS, Checked, setting
 
 MOST_SAMPLES = 2**27
 """Of an update: some 100 GB."""
 
 
-def setting(help: str, *, unit: str = "", symbol: str = "", group: str = "", **limits):
-    """A field without default.
-
-    Args:
-        help: what it means, in a line or two.
-        unit: of the number, where ``help`` does not say what it counts.
-        symbol: the paper's, or the literature's.
-        group: of ``GROUPS``.
-        limits: ``choices``, or ``low``, ``high`` (inclusive), ``above`` and ``below``
-            (exclusive), of each element where the field is a tuple, and ``most`` elements;
-            ``or_function``: a user's function will do, as ``module:function``.
-    """
-    return dataclasses.field(
-        metadata={"help": help, "unit": unit, "symbol": symbol, "group": group, **limits}
-    )
-
-
-GROUPS = {
-    "run": "run",
-    "task": "task",
-    "networks": "networks",
-    "ppo": "PPO",
-    "logging": "logging and debugging",
-}
-"""Titles of the groups of settings."""
-
 _run, _task, _networks, _ppo, _logging = (functools.partial(setting, group=g) for g in GROUPS)
 
 
-def single(name: str, kind: type, help: str, **limits) -> dataclasses.Field:
-    """A field, as of :func:`setting`, that belongs to no class: for :func:`check`."""
-    field = setting(help, **limits)
-    field.name, field.type = name, kind
-    return field
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Settings:
-    """Settings of a training run; ``presets.py`` gives the values.
-
-    Raises:
-        ValueError: a value is out of its range, or two values do not fit together.
-    """
-
-    total_steps: int = _run(
-        "agent steps in the whole run, rounded up to whole updates", low=1, high=10**13
-    )
+class Task(Checked):
+    """What is flown in training, and what the learner is told of it."""
 
     frameskips: tuple[int, ...] = _task(
         "torque-free RK4 steps of 1/240 s after an impulse, k of them for 240/(k + 1) Hz; the "
@@ -97,6 +51,11 @@ class Settings:
         "start the first episodes at random times, so that they do not end all at once"
     )
 
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Network(Checked):
+    """What the networks see, their size, and the mask of their actions."""
+
     features: str = _networks(
         "network inputs: Eq. 11 as it is, tanh(k x) of attitude and rate at nine scales, or "
         "module:function",
@@ -115,6 +74,14 @@ class Settings:
         high=1,
     )
 
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class PPO(Checked):
+    """How it is learned."""
+
+    total_steps: int = _run(
+        "agent steps in the whole run, rounded up to whole updates", low=1, high=10**13
+    )
     num_envs: int = _ppo(
         "spacecraft simulated side by side (the paper's 30 episodes an epoch, Table 4)",
         symbol="M",
@@ -146,35 +113,6 @@ class Settings:
     normalize_advantage: bool = _ppo("standardise the advantages (Eq. 5) of each minibatch")
     max_gradient_norm: float = _ppo("clip each network's gradient norm; 0: do not", low=0)
 
-    updates_per_block: int = _logging(
-        "updates between two looks at the run, each a row of metrics.csv", low=1, high=10**6
-    )
-
-    def __post_init__(self):
-        for field in dataclasses.fields(self):
-            object.__setattr__(self, field.name, check(field, getattr(self, field.name)))
-        if self.num_envs < len(self.frameskips):
-            raise ValueError(
-                f"num_envs is {self.num_envs}; it must be at least {len(self.frameskips)}, "
-                f"the number of frameskips"
-            )
-        if self.minibatch_size > self.steps_per_update:
-            raise ValueError(
-                f"minibatch_size is {self.minibatch_size}; it must be at most "
-                f"num_envs x rollout_length = {self.steps_per_update}"
-            )
-        if self.steps_per_update > MOST_SAMPLES:
-            raise ValueError(
-                f"num_envs x rollout_length is {self.steps_per_update}; "
-                f"it must be at most {MOST_SAMPLES}"
-            )
-        if self.num_updates * self.passes * self.minibatches >= 2**31:
-            raise ValueError(
-                f"total_steps is {self.total_steps}; with these passes and minibatches that makes "
-                f"{self.num_updates * self.passes * self.minibatches} gradient steps, and they "
-                f"must be fewer than 2^31"
-            )
-
     @property
     def steps_per_update(self) -> int:
         """Agent steps that one update learns from."""
@@ -190,6 +128,97 @@ class Settings:
         """Gradient steps in a pass; samples beyond whole minibatches sit that pass out."""
         return self.steps_per_update // self.minibatch_size
 
+    @property
+    def gradient_steps(self) -> int:
+        """In the whole run."""
+        return self.num_updates * self.passes * self.minibatches
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Logging(Checked):
+    """What is told of the run while it goes on."""
+
+    updates_per_block: int = _logging(
+        "updates between two looks at the run, each a row of metrics.csv", low=1, high=10**6
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Settings of a training run, by subject; ``presets.py`` gives the values.
+
+    Raises:
+        ValueError: a value is out of its range, or two values do not fit together.
+
+    Example:
+        >>> from attjax.presets import PAPER
+        >>> wide = PAPER.replace(hidden_sizes=(512, 512), num_envs=64)
+        >>> wide.network.hidden_sizes, wide.ppo.num_envs
+        ((512, 512), 64)
+    """
+
+    task: Task
+    network: Network
+    ppo: PPO
+    logging: Logging
+
+    def __post_init__(self):
+        if self.ppo.num_envs < len(self.task.frameskips):
+            raise ValueError(
+                f"num_envs is {self.ppo.num_envs}; it must be at least "
+                f"{len(self.task.frameskips)}, the number of frameskips"
+            )
+        self._check_sizes()
+
+    def _check_sizes(self):
+        ppo = self.ppo
+        if ppo.minibatch_size > ppo.steps_per_update:
+            raise ValueError(
+                f"minibatch_size is {ppo.minibatch_size}; it must be at most "
+                f"num_envs x rollout_length = {ppo.steps_per_update}"
+            )
+        if ppo.steps_per_update > MOST_SAMPLES:
+            raise ValueError(
+                f"num_envs x rollout_length is {ppo.steps_per_update}; "
+                f"it must be at most {MOST_SAMPLES}"
+            )
+        if ppo.gradient_steps >= 2**31:
+            raise ValueError(
+                f"total_steps is {ppo.total_steps}; with these passes and minibatches that makes "
+                f"{ppo.gradient_steps} gradient steps, and they must be fewer than 2^31"
+            )
+
+    @property
+    def flat(self) -> dict:
+        """All values by name."""
+        return {name: getattr(getattr(self, SUBJECT_OF[name]), name) for name in FIELDS}
+
+    def replace(self, **values) -> "Settings":
+        """The same but for values given by their names, whatever their subjects.
+
+        Raises:
+            ValueError: as the class, or a name is unknown.
+        """
+        return from_flat(self.flat | values)
+
+
+SUBJECTS = {field.name: field.type for field in dataclasses.fields(Settings)}
+"""The classes that settings are composed of, by the names of their subjects."""
+
+SUBJECT_OF = {
+    field.name: name for name, subject in SUBJECTS.items() for field in dataclasses.fields(subject)
+}
+"""The subject of each setting."""
+
+FIELDS = {
+    field.name: field
+    for group in GROUPS
+    for subject in SUBJECTS.values()
+    for field in dataclasses.fields(subject)
+    if field.metadata["group"] == group
+}
+"""What describes each setting, group by group."""
+
 
 def from_json(values: dict) -> Settings:
     """Settings from what ``json.loads`` makes of ``dataclasses.asdict(settings)``.
@@ -197,55 +226,22 @@ def from_json(values: dict) -> Settings:
     Raises:
         ValueError: a name is unknown or missing, or a value is out of range.
     """
-    names = {field.name for field in dataclasses.fields(Settings)}
-    if set(values) != names:
-        wrong = sorted(set(values) ^ names)
-        raise ValueError(f"settings are unknown or missing: {', '.join(wrong)}")
-    return Settings(**values)
+    if not (isinstance(values, dict) and all(isinstance(x, dict) for x in values.values())):
+        raise ValueError(f"settings are {values!r:.40}; they must be {', '.join(SUBJECTS)}")
+    return from_flat({k: x for subject in values.values() for k, x in subject.items()})
 
 
-def check(field: dataclasses.Field, value):
-    """Return a value that fits the setting, as Python's own: lists and NumPy's numbers will do.
+def from_flat(values: dict) -> Settings:
+    """Settings from all values by name, as of :attr:`Settings.flat`, or JSON of it.
 
     Raises:
-        ValueError: it does not fit; the message names what is allowed.
+        ValueError: a name is unknown or missing, or a value is out of range.
     """
-    value = plain(value)
-    is_tuple = field.type == tuple[int, ...]
-    kind = int if is_tuple else field.type
-    elements = value if is_tuple else (value,)
-    fits = isinstance(elements, tuple) and 0 < len(elements) <= field.metadata.get("most", math.inf)
-    if not (fits and all(_fits(kind, field.metadata, x) for x in elements)):
-        name = {int: "an integer", float: "a number", bool: "true or false"}.get(kind, "")
-        allowed = ["integers" if is_tuple else name, limits(field)]
-        raise ValueError(f"{field.name} is {value!r}; it must be {' '.join(filter(None, allowed))}")
-    return value
-
-
-def _fits(kind, limits, x):
-    if type(x) is not kind and not (kind is float and type(x) is int):
-        return False
-    if kind not in (int, float):
-        is_function = limits.get("or_function", False) and user_functions.is_name(x)
-        return is_function or x in limits.get("choices", (x,))
-    return (
-        math.isfinite(x)
-        and limits.get("low", x) <= x <= limits.get("high", x)
-        and limits.get("above", -math.inf) < x < limits.get("below", math.inf)
-    )
-
-
-def limits(field: dataclasses.Field) -> str:
-    """What its values may be, beside their type; empty where there is no limit.
-
-    Example:
-        >>> limits(Settings.__dataclass_fields__["discount"])
-        'above 0 and at most 1'
-    """
-    given = field.metadata
-    if "choices" in given:
-        choices = "one of " + ", ".join(given["choices"])
-        return choices + (", or module:function" if "or_function" in given else "")
-    words = {"low": "at least", "above": "above", "high": "at most", "below": "below"}
-    described = " and ".join(f"{word} {given[k]}" for k, word in words.items() if k in given)
-    return described + (f", {given['most']} of them at most" if "most" in given else "")
+    if set(values) != set(FIELDS):
+        wrong = sorted(set(values) ^ set(FIELDS))
+        raise ValueError(f"settings are unknown or missing: {', '.join(wrong)}")
+    of_subject = {
+        name: {field.name: values[field.name] for field in dataclasses.fields(subject)}
+        for name, subject in SUBJECTS.items()
+    }
+    return Settings(**{name: SUBJECTS[name](**x) for name, x in of_subject.items()})

@@ -115,7 +115,7 @@ class NearGoalStarts:
     Angle and rate of those are log-uniform, down to 1e-6 rad and 2.5e-6 rad/s, in random
     directions. So the learner practises the last decades from the first update on, not only
     once it can steer there. They start late in the episode, ``steps`` before the time limit,
-    and never at time 0, which marks whole episodes.
+    and never at time 0, by which :func:`starts_whole` tells whole episodes.
 
     Attributes:
         share: of the episodes that start near the goal; the others are as the paper's.
@@ -132,10 +132,30 @@ class NearGoalStarts:
         near = EnvState(
             quaternion=quaternions.from_axis_angle(_direction(u[2:4]), angle),
             angular_velocity=rate * _direction(u[4:6]),
-            time=jnp.maximum(params.max_steps_in_episode - self.steps, 1),
+            time=jnp.maximum(params.max_steps_in_episode - self.steps, 1),  # not whole
         )
         slew = _slew(u[7:], params)
         return jax.tree.map(lambda a, b: jnp.where(u[6] < self.share, a, b), near, slew)
+
+
+def starts_whole(state: EnvState) -> chex.Array:
+    """Whether the episode that begins with this state is one of the task's, of full length.
+
+    The others are practice from the middle of it: near the goal, as of :class:`NearGoalStarts`,
+    or cut short. What they come to says nothing of the task.
+
+    Args:
+        state: the first of the episode, or a batch of them.
+
+    Returns:
+        A bool for each state.
+
+    Example:
+        >>> start = initial_state(jax.random.key(0), default_params())
+        >>> bool(starts_whole(start)), bool(starts_whole(start.replace(time=400)))
+        (True, False)
+    """
+    return jnp.asarray(state.time) == 0
 
 
 def _direction(u):
@@ -143,6 +163,23 @@ def _direction(u):
     cosine, azimuth = 2 * u[0] - 1, 2 * jnp.pi * u[1]
     sine = jnp.sqrt(1 - cosine**2)
     return jnp.stack([sine * jnp.cos(azimuth), sine * jnp.sin(azimuth), cosine])
+
+
+def applied_torque(action: chex.Array, params: EnvParams) -> chex.Array:
+    """The torque that an action gives: the one way from a decision to what turns the spacecraft.
+
+    Args:
+        action: integer scalar, row of the torque table (Table 1).
+        params: of the spacecraft.
+
+    Returns:
+        (3,) torque, body frame, N m, for as long as the environment's context says.
+
+    Example:
+        >>> applied_torque(4, default_params()).tolist()
+        [0.0, -0.5, 0.0]
+    """
+    return params.torque_table[action]
 
 
 def step(
@@ -176,13 +213,14 @@ def step(
     params = default_params(frameskip) if params is None else params
     check_params(params, frameskip)
     action = checks.integer("action", action, 0, len(params.torque_table) - 1)
-    quaternion, angular_velocity = dynamics.propagate(
-        checks.unit_quaternion("quaternion", state.quaternion),
-        state.angular_velocity,
-        params.torque_table[action],
-        params.inertia,
-        frameskip,
-        params.frameskip,
-        params.torque_held,
-    )
-    return EnvState(quaternion, angular_velocity, state.time + 1)
+    quaternion = checks.unit_quaternion("quaternion", state.quaternion)
+    angular_velocity = checks.real("angular_velocity", state.angular_velocity, (3,))
+    moving = quaternion, angular_velocity, applied_torque(action, params), params.inertia
+    have_values = all(map(checks.has_value, jax.tree.leaves((moving, params.frameskip))))
+    propagate = _compiled_propagate if have_values else dynamics.propagate
+    moved = propagate(*moving, frameskip, params.frameskip, params.torque_held)
+    return EnvState(*moved, state.time + 1)
+
+
+_compiled_propagate = jax.jit(dynamics.propagate, static_argnames=("frameskip", "held"))
+"""For steps outside ``jit`` and ``vmap``, each of which would compile its loops anew."""

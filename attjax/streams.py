@@ -1,14 +1,25 @@
-"""Standard output and error that may fail: the work of a program goes on without them.
+"""Standard output and error that may fail, or lack characters: the work of a program goes on.
 
 A reader may leave (``| head``), a disk fill up, a terminal hang up. What is printed from then on is
-dropped, and the failure kept for the exit status.
+dropped, and the failure kept for the exit status. Where there is no Greek, symbols are spelled out.
 """
 
+import codecs
 import contextlib
 import errno
 import io
 import os
 import sys
+from collections.abc import Iterator
+
+ERRORS = "attjax.plain"
+"""The name of our error handler among the codecs'."""
+
+PLAIN = {
+    "γ": "gamma", "λ": "lambda", "ε": "epsilon", "φ": "phi", "ω": "omega", "θ": "theta",
+    "Â": "A^", "°": "deg", "²": "^2", "½": "1/2", "‖": "|", "–": "-", "−": "-", "—": "-",
+    "…": "...", "×": "x", "·": "*", "≤": "<=", "≥": ">=", "→": "->", "µ": "u", "─": "-", "━": "-",
+}  # fmt: skip
 
 
 class Output(io.FileIO):
@@ -20,7 +31,7 @@ class Output(io.FileIO):
 
     failure: OSError | None = None
 
-    def write(self, data) -> int:
+    def write(self, data: bytes | memoryview) -> int:
         """Write, or drop what is to be written."""
         if self.failure is None:
             try:
@@ -31,7 +42,7 @@ class Output(io.FileIO):
 
 
 @contextlib.contextmanager
-def guarded():
+def guarded() -> Iterator[None]:
     """Let nothing that is printed to Python's own stdout and stderr raise, within the context.
 
     Streams that someone put in their place, as a notebook does, are left as they are.
@@ -89,3 +100,32 @@ def failure() -> OSError | None:
 def reader_left(error: OSError) -> bool:
     """Whether it failed since nobody reads on, which is no fault."""
     return error.errno == errno.EPIPE
+
+
+def print_anywhere() -> None:
+    """Let stdout and stderr take any text: what their encoding lacks is written out in ASCII."""
+    codecs.register_error(ERRORS, _replace)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors=ERRORS)
+
+
+def _replace(error):
+    """A codec's error handler."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return "".join(map(_spelled, error.object[error.start : error.end])), error.end
+
+
+def plain(text: str) -> str:
+    """The text in ASCII.
+
+    Example:
+        >>> plain("φ ≤ 0.25°")
+        'phi <= 0.25deg'
+    """
+    return "".join(map(_spelled, text))
+
+
+def _spelled(character):
+    return character if character.isascii() else PLAIN.get(character, "?")

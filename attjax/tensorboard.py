@@ -7,41 +7,20 @@ Only tensorboardX's protocol buffers and checksum are used: its writers work in 
 full disk ends in a traceback, and put hyperparameters into a further run beside the curves.
 """
 
-import dataclasses
 import struct
 import time
 from pathlib import Path
+from typing import Any
 
 from tensorboardX.proto.event_pb2 import Event, SessionLog
 from tensorboardX.proto.summary_pb2 import Summary
 from tensorboardX.record_writer import masked_crc32c
 from tensorboardX.summary import hparams
 
-from attjax import belongings, metrics, run_folder
-
-TAGS = {
-    "episode_return": "episode/return",
-    "episode_return_std": "episode/return_std",
-    "success_rate": "episode/success_rate",
-    "overspeed_rate": "episode/overspeed_rate",
-    "terminal_error_deg": "episode/terminal_error_deg",
-    "episodes": "episode/ended",
-    "episode_return_n": "episode/return_n",
-    "policy_loss": "loss/policy",
-    "value_loss": "loss/value",
-    "explained_variance": "loss/explained_variance",
-    "entropy": "policy/entropy",
-    "approximate_kl": "policy/approximate_kl",
-    "clip_fraction": "policy/clip_fraction",
-    "wall_s": "time/wall_s",
-}
-"""Of the columns of metrics.csv but the agent steps, which every curve is drawn against."""
+from attjax import belongings, metrics, metrics_file, run_folder
 
 RATE = "time/steps_per_s"
 """Agent steps a second between two rows."""
-
-COMPARED = ("episode_return", "success_rate", "overspeed_rate", "terminal_error_deg")
-"""Columns that stand beside the settings in the tab HPARAMS."""
 
 
 class EventFile:
@@ -56,8 +35,9 @@ class EventFile:
         FolderError: it cannot be written.
     """
 
-    def __init__(self, folder: Path, config: run_folder.Config, rows: list[dict]):
-        self._folder, self._last = folder, None
+    def __init__(self, folder: Path, config: run_folder.Config, rows: list[dict[str, str]]) -> None:
+        self._folder = folder
+        self._last: tuple[int, float] | None = None
         seconds = float(rows[-1]["wall_s"]) if rows else 0.0
         self._start = time.time() - seconds  # as if the run had never paused
         events = [*_head(self._start, config), *(self._event(row) for row in rows)]
@@ -68,19 +48,20 @@ class EventFile:
             belongings.remove_events(folder, run)
             run_folder.replace(self._path, b"".join(map(_record, events)))
 
-    def append(self, row: dict) -> None:
+    def append(self, row: dict[str, Any]) -> None:
         """Add one row of metrics.
 
         Raises:
             FolderError: it cannot be written.
         """
-        record = _record(self._event(metrics.cells(row)))
+        record = _record(self._event(metrics_file.cells(row)))
         with run_folder.writing(self._folder), self._path.open("ab") as file:
             file.write(record)
 
     def _event(self, cells):
         """The curves' next points; cells that are empty make none."""
-        values = {TAGS[name]: float(x) for name, x in cells.items() if name in TAGS and _is_set(x)}
+        tags = {metric.name: metric.tag for metric in metrics.METRICS if metric.tag}
+        values = {tags[name]: float(x) for name, x in cells.items() if name in tags and _is_set(x)}
         steps, seconds = int(cells["agent_steps"]), float(cells["wall_s"])
         last_steps, last_seconds = self._last or (0, 0.0)
         if seconds > last_seconds:
@@ -99,10 +80,11 @@ def _head(wall_time, config):
     yield Event(wall_time=wall_time, file_version="brain.Event:2")
     yield Event(wall_time=wall_time, session_log=SessionLog(status=SessionLog.START))
     values = {"preset": config.preset, "seed": config.seed, "spacecraft": config.spacecraft.name}
-    values |= dataclasses.asdict(config.settings)
+    values |= config.settings.flat
     shown = {k: ",".join(map(str, v)) if isinstance(v, tuple) else v for k, v in values.items()}
     # The session's end is left out: it would say that the run has ended, and how.
-    for summary in hparams(shown, dict.fromkeys(TAGS[name] for name in COMPARED))[:2]:
+    compared = dict.fromkeys(metric.tag for metric in metrics.METRICS if metric.is_compared)
+    for summary in hparams(shown, compared)[:2]:
         yield Event(wall_time=wall_time, summary=summary)
 
 

@@ -5,7 +5,18 @@ from pathlib import Path
 
 import jax
 
-from attjax import assembly, checkpoint, cli, errors, learner, metrics, nan_search, ppo, progress
+from attjax import (
+    assembly,
+    checkpoint,
+    cli,
+    errors,
+    learner,
+    metrics,
+    metrics_file,
+    nan_search,
+    ppo,
+    progress,
+)
 from attjax.run_folder import Config
 from attjax.settings import Settings
 from attjax.signals import StopSignals
@@ -33,19 +44,19 @@ class Run:
         if checkpoint.latest(folder) is not None:
             self.learner = checkpoint.restore_learner(folder, self.learner)
         self.update = int(self.learner.update)
-        self.metrics_file = metrics.MetricsFile(folder, self.agent_steps)
+        self.metrics_file = metrics_file.MetricsFile(folder, self.agent_steps)
         self.logs = [self.metrics_file]
         self.terminal_error = None
 
     @property
     def agent_steps(self) -> int:
         """Agent steps done."""
-        return self.update * self.settings.steps_per_update
+        return self.update * self.settings.ppo.steps_per_update
 
     @property
     def goes_on(self) -> bool:
         """Whether there is another block to run."""
-        return self.update < self.settings.num_updates and self.stop.received is None
+        return self.update < self.settings.ppo.num_updates and self.stop.received is None
 
     def describe(self, device) -> None:
         """Print what the run is, and where it stands."""
@@ -53,8 +64,8 @@ class Run:
         craft = self.config.spacecraft
         print(
             f"preset {self.config.preset}, {craft.name}, seed {self.config.seed}, "
-            f"{settings.num_updates * settings.steps_per_update:,} agent steps "
-            f"({settings.num_updates:,} updates of {settings.steps_per_update:,}) on "
+            f"{settings.ppo.num_updates * settings.ppo.steps_per_update:,} agent steps "
+            f"({settings.ppo.num_updates:,} updates of {settings.ppo.steps_per_update:,}) on "
             f"{self.setup.num_devices} x {device.device_kind} ({device.platform}), in {self.folder}"
         )
         if self.update:
@@ -73,12 +84,13 @@ class Run:
 
     def announce_longer(self, before: Settings) -> None:
         """Print what a larger total than ``before``'s changes from here on."""
-        steps = self.update * self.settings.passes * self.settings.minibatches
-        old, new = (learner.learning_rate(s, steps) for s in (before, self.settings))
+        old, new = before.ppo, self.settings.ppo
+        steps = self.update * new.passes * new.minibatches
+        slow, fast = (learner.learning_rate(ppo, steps) for ppo in (old, new))
         print(
-            f"total steps raised from {before.total_steps:,} to {self.settings.total_steps:,}: "
-            f"at {self.agent_steps:,} the learning rate goes from {old:.3g} to {new:.3g}, and from "
-            f"there to {self.settings.final_learning_rate:.3g} at the new end; the entropy bonus "
+            f"total steps raised from {old.total_steps:,} to {new.total_steps:,}: "
+            f"at {self.agent_steps:,} the learning rate goes from {slow:.3g} to {fast:.3g}, "
+            f"and from there to {new.final_learning_rate:.3g} at the new end; the entropy bonus "
             f"likewise"
         )
 
@@ -89,20 +101,20 @@ class Run:
             FolderError: the folder cannot be written. Its checkpoints are as they were.
         """
         train_block = self._compiled(debug_nans) if self.goes_on else None
-        total = self.settings.num_updates * self.settings.steps_per_update
+        total = self.settings.ppo.num_updates * self.settings.ppo.steps_per_update
         rows = self.metrics_file.kept
         with checkpoint.Saver(self.folder) as saver:
             with progress.Progress(total, self.agent_steps, rows, self.stop) as view:
                 diverged = self._loop(train_block, saver, view, save_every_s)
             if diverged:
-                errors.error_line("train.py", diverged)
+                errors.error_line(diverged)
                 return DIVERGED
             saver.save(self.learner, self.terminal_error)
         if self.stop.received is not None:
             print(f"stopped and saved at {self.agent_steps:,} agent steps; continue with --resume")
             return 128 + self.stop.received
         folder = cli.quoted(self.folder)
-        print(f"trained; evaluate with: python eval.py --checkpoint {folder}")
+        print(f"trained; evaluate with: {cli.invocation('eval')} --checkpoint {folder}")
         return 0
 
     def _compiled(self, debug_nans):
@@ -119,7 +131,9 @@ class Run:
         """Run blocks until the end or a signal; returns what diverged, if anything."""
         start, saved = time.monotonic() - self.metrics_file.wall_s, time.monotonic()
         while self.goes_on:
-            count = min(self.settings.updates_per_block, self.settings.num_updates - self.update)
+            count = min(
+                self.settings.logging.updates_per_block, self.settings.ppo.num_updates - self.update
+            )
             try:
                 self.learner, block = train_block(self.env_params, self.learner, count)
             except nan_search.NotFinite as found:
@@ -131,7 +145,7 @@ class Run:
                 return self._divergence(first, 1, names)
             self.update += count
             row = metrics.block_row(
-                block, self.settings.frameskips, self.agent_steps, time.monotonic() - start
+                block, self.settings.task.frameskips, self.agent_steps, time.monotonic() - start
             )
             self.terminal_error = row["terminal_error_deg"]
             for log in self.logs:
@@ -144,7 +158,7 @@ class Run:
 
     def _divergence(self, update, count, what):
         """One line that says in which of the updates what was not finite."""
-        steps = (update + count) * self.settings.steps_per_update
+        steps = (update + count) * self.settings.ppo.steps_per_update
         updates = f"update {update}" if count == 1 else f"updates {update} to {update + count - 1}"
         kept = checkpoint.latest(self.folder)
         kept = "no checkpoint yet" if kept is None else f"the good one of update {kept}"

@@ -7,14 +7,16 @@ import sys
 import traceback
 from collections.abc import Callable
 
+from attjax.errors import UserError
+
 NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
-class FunctionError(ValueError):
+class FunctionError(UserError, ValueError):
     """A user's function cannot be used; the message is one line that names it."""
 
 
-def is_name(x) -> bool:
+def is_name(x: object) -> bool:
     """Whether x has the form ``package.module:function``."""
     return isinstance(x, str) and NAME.fullmatch(x) is not None
 

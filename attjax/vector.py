@@ -7,13 +7,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import struct
-from jax.sharding import Mesh, PartitionSpec
+from jax.sharding import PartitionSpec
 
-from attjax import numerics
-
-AXIS = "devices"
-COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512}
-"""For outermost jitted functions only: JAX refuses options on a function called in another."""
+from attjax import numerics, sharding
+from attjax.sharding import AXIS, SHARED, SPLIT
 
 CPU_BLOCK = 4096
 """Spacecraft whose states and intermediate results fit a core's cache."""
@@ -22,9 +19,17 @@ PORTIONS = 16
 """New episodes are drawn for a batch's 16th part at a time: rarely more end in one step."""
 
 
-def mesh(num_devices: int) -> Mesh:
-    """The first devices of JAX's default platform, as one axis."""
-    return Mesh(np.array(jax.devices()[:num_devices]), (AXIS,))
+def param_axes(env, params):
+    """For ``vmap``: 0 for parameters in which the spacecraft differ, None for the others."""
+    return jax.tree.map(
+        lambda x, default: 0 if np.ndim(x) > np.ndim(default) else None, params, env.default_params
+    )
+
+
+def params_of(env, params, row):
+    """The parameters of one spacecraft of a batch."""
+    axes = param_axes(env, params)
+    return jax.tree.map(lambda x, axis: x if axis is None else x[row], params, axes)
 
 
 def step(env, params, key: chex.PRNGKey, states, actions):
@@ -35,7 +40,7 @@ def step(env, params, key: chex.PRNGKey, states, actions):
 
     Args:
         env: an environment of :class:`attjax.AttitudeEnv`'s protocol.
-        params: its parameters, the same for all.
+        params: its parameters; those in which the spacecraft differ have a leading axis (batch,).
         key: of this step.
         states: batched states, (batch, ...).
         actions: (batch,) integers.
@@ -43,15 +48,20 @@ def step(env, params, key: chex.PRNGKey, states, actions):
     Returns:
         What ``env.step`` returns, each with a leading axis (batch,).
     """
-    batch = len(actions)
-    step_key, fresh_key = jax.random.split(key)
-    observations, states, rewards, terminated, info = jax.vmap(env.step_env, (0, 0, 0, None))(
-        jax.random.split(step_key, batch), states, actions, params
-    )
+    return step_and_restart(env, params, jax.random.split(key), states, actions)
+
+
+def step_and_restart(env, params, keys: chex.PRNGKey, states, actions):
+    """As :func:`step`, with two keys: of the steps, and of the new episodes."""
+    step_key, fresh_key = keys
+    step_keys = jax.random.split(step_key, len(actions))
+    observations, states, rewards, terminated, info = jax.vmap(
+        env.step_env, (0, 0, 0, param_axes(env, params))
+    )(step_keys, states, actions, params)
     info = {**info, "final_observation": observations}
     truncated = info["truncated"]
     observations, states = restart(
-        lambda key, _: env.reset(key, params),
+        lambda key, row: env.reset(key, params_of(env, params, row)),
         fresh_key,
         terminated | truncated,
         (observations, states),
@@ -103,7 +113,7 @@ class Totals:
     jax.jit,
     static_argnames=("env", "num_devices"),
     donate_argnames="states",
-    compiler_options=COMPILER_OPTIONS,
+    compiler_options=sharding.COMPILER_OPTIONS,
 )
 def open_loop(env, params, key: chex.PRNGKey, states, actions, num_devices: int = 1):
     """Fly a batch through given actions, with automatic reset: the fused rollout.
@@ -125,14 +135,13 @@ def open_loop(env, params, key: chex.PRNGKey, states, actions, num_devices: int 
             devices are too many or do not share it evenly.
     """
     _check_batch(states, actions, num_devices)
-    shared, split = PartitionSpec(), PartitionSpec(AXIS)
-    return jax.shard_map(
+    fly = sharding.on_devices(
+        num_devices,
         functools.partial(_fly_in_blocks, env),
-        mesh=mesh(num_devices),
-        in_specs=(shared, shared, split, PartitionSpec(None, AXIS)),
-        out_specs=split,
-        check_vma=False,
-    )(params, jax.random.split(key, num_devices), states, actions)
+        (SHARED, SHARED, SPLIT, PartitionSpec(None, AXIS)),
+        SPLIT,
+    )
+    return fly(params, jax.random.split(key, num_devices), states, actions)
 
 
 def _check_batch(states, actions, num_devices):

@@ -177,9 +177,9 @@ def write_json(path: Path | None, result: dict) -> None:
         path.write_text(json.dumps(result, indent=1) + "\n")
 
 
-def parser(name: str, description: str) -> cli.Parser:
+def parser(description: str) -> cli.Parser:
     """A parser with --json."""
-    parser = cli.Parser(prog=name, description=description)
+    parser = cli.Parser(description=description)
     parser.add_argument(
         "--json", type=writable_file, metavar="FILE", help="write the figures there"
     )

@@ -9,7 +9,7 @@ from common import Flight
 from jax.sharding import NamedSharding, PartitionSpec
 
 import attjax
-from attjax import AttitudeEnv, vector
+from attjax import AttitudeEnv, sharding, vector
 
 FRAMESKIP = 20
 ENV = AttitudeEnv(FRAMESKIP)
@@ -26,9 +26,9 @@ def steps_a_call(num_envs: int) -> int:
 def fused(num_envs: int, num_devices: int = 1) -> Flight:
     """The whole agent step of a batch, ``attjax.vector.open_loop``."""
     key, states, actions = _start(num_envs)
-    mesh = vector.mesh(num_devices)
-    states = jax.device_put(states, NamedSharding(mesh, PartitionSpec(vector.AXIS)))
-    actions = jax.device_put(actions, NamedSharding(mesh, PartitionSpec(None, vector.AXIS)))
+    mesh = sharding.mesh(num_devices)
+    states = jax.device_put(states, NamedSharding(mesh, PartitionSpec(sharding.AXIS)))
+    actions = jax.device_put(actions, NamedSharding(mesh, PartitionSpec(None, sharding.AXIS)))
     lower = functools.partial(vector.open_loop.lower, num_devices=num_devices)
     return _flight(lower, (ENV,), (ENV.default_params, key), states, actions)
 
@@ -36,7 +36,7 @@ def fused(num_envs: int, num_devices: int = 1) -> Flight:
 def physics(num_envs: int) -> Flight:
     """``vmap(attjax.step)`` in a scan: no reward, no observation, no end of episode."""
     _, states, actions = _start(num_envs)
-    options = vector.COMPILER_OPTIONS if jax.default_backend() == "cpu" else None
+    options = sharding.COMPILER_OPTIONS if jax.default_backend() == "cpu" else None
 
     def fly(params, states, actions):
         def body(states, actions):

@@ -7,7 +7,6 @@ Example:
 """
 
 import argparse
-import dataclasses
 import json
 import os
 import resource
@@ -30,7 +29,7 @@ MEMORY_NOTE = "Peak memory is the whole process's, with Python, JAX and the comp
 
 def parse_arguments(argv):
     """The command line; --child is for the processes that this script starts."""
-    parser = common.parser("scaling.py", __doc__)
+    parser = common.parser(__doc__)
     common.add_num_envs(parser, NUM_ENVS)
     cli.add_number(parser, "repeats", int, 7, "measurements of each figure", low=1)
     cli.add_number(parser, "cores", int, 2, "compare one core and that many", low=1)
@@ -46,13 +45,14 @@ def parse_arguments(argv):
     return parser.parse_args(argv)
 
 
+@errors.program("scaling.py")
 def main(argv=None) -> int:
     """Run the benchmark; returns the exit status."""
     arguments = parse_arguments(argv)
     if arguments.child is not None:
         print(json.dumps(child(**arguments.child)))
         return 0
-    with errors.one_line_errors("scaling.py"):
+    with errors.one_line_errors():
         check(arguments)
     machine = common.machine()
     common.print_machine(machine)
@@ -127,7 +127,7 @@ def train(hidden_sizes: list[int], minibatch_size: int, cores: int) -> dict:
     from attjax import assembly, learner, ppo, presets
 
     changes = {"hidden_sizes": tuple(hidden_sizes), "minibatch_size": minibatch_size}
-    settings = dataclasses.replace(presets.PRECISE, **changes)
+    settings = presets.PRECISE.replace(**changes)
     setup = assembly.setup(settings, num_devices=cores)
     env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(0))
@@ -136,7 +136,7 @@ def train(hidden_sizes: list[int], minibatch_size: int, cores: int) -> dict:
         start = time.perf_counter()
         state, _ = jax.block_until_ready(ppo.train_block(setup, env_params, state, 1))
         durations.append(time.perf_counter() - start)
-    rates = [settings.steps_per_update / duration for duration in durations[1:]]
+    rates = [settings.ppo.steps_per_update / duration for duration in durations[1:]]
     return {"compile_s": durations[0] - min(durations[1:]), **common.summary(rates)}
 
 

@@ -36,7 +36,7 @@ COLUMNS = (
 
 def parse_arguments(argv):
     """The command line."""
-    parser = common.parser("simulator.py", __doc__)
+    parser = common.parser(__doc__)
     plot_help = "draw throughput against the number of spacecraft"
     parser.add_argument("--plot", type=common.writable_file, metavar="FILE.png", help=plot_help)
     common.add_num_envs(parser, NUM_ENVS)
@@ -46,17 +46,18 @@ def parse_arguments(argv):
     return parser.parse_args(argv)
 
 
+@errors.program("simulator.py")
 def main(argv=None) -> int:
     """Run the benchmark; returns the exit status."""
     arguments = parse_arguments(argv)
-    with errors.one_line_errors("simulator.py"):
+    with errors.one_line_errors():
         check_sizes(arguments)
         device = select_device(arguments.device, arguments.cores)
     machine = common.machine(device.device_kind if arguments.device == "gpu" else None)
     common.print_machine(machine)
     # Imported late: it imports JAX's arrays, and cores and device must be set before.
     peers = importlib.import_module("peers")
-    with errors.one_line_errors("simulator.py", ArithmeticError):
+    with errors.one_line_errors(ArithmeticError):
         contenders, absent = peers.find(arguments.device, arguments.cores)
     rows, ceilings = measure(peers, contenders, arguments.num_envs, arguments.repeats)
     result = {"machine": machine, "cores": arguments.cores, "ceilings": ceilings}

@@ -23,6 +23,8 @@ from pathlib import Path
 
 import common
 
+from attjax import errors
+
 ROOT = Path(__file__).resolve().parents[1]
 PLATEAU = 2500
 RECIPES = {
@@ -52,7 +54,7 @@ class Point:
 
 def parse_arguments(argv=None):
     """The command line."""
-    parser = common.parser("time_to_quality.py", __doc__)
+    parser = common.parser(__doc__)
     plot_help = "also draw the curves (PNG)"
     parser.add_argument("--plot", type=common.writable_file, metavar="FILE", help=plot_help)
     recipes_help = "these only (default: all)"
@@ -64,7 +66,8 @@ def parse_arguments(argv=None):
     return parser.parse_args(argv)
 
 
-def main(argv=None):
+@errors.program("time_to_quality.py")
+def main(argv=None) -> int:
     """Train all recipes and print the table."""
     arguments = parse_arguments(argv)
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
@@ -79,6 +82,7 @@ def main(argv=None):
         import quality_plot
 
         quality_plot.plot(curves, PLATEAU, arguments.plot)
+    return 0
 
 
 def learning_curve(name: str, arguments) -> list[Point]:
@@ -178,7 +182,7 @@ class Examiner:
         settings = run_folder.read_config(self._folder).settings
         return Point(
             seconds=round(seconds, 1),
-            agent_steps=update * settings.steps_per_update,
+            agent_steps=update * settings.ppo.steps_per_update,
             episode_return=mean_return,
             mean_error=at_40_hz["terminal"]["error_deg"]["mean"],
             max_error=at_40_hz["terminal"]["error_deg"]["max"],
@@ -226,4 +230,4 @@ def print_table(curves: dict) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -21,6 +21,8 @@ from pathlib import Path
 import common
 from contenders import Contender, Peer, PeerError, Workload, measure, with_rates
 
+from attjax import errors
+
 MORE_PASSES = 10
 """Passes at which attjax is compared with Stable-Baselines3, whose default they are."""
 
@@ -38,7 +40,7 @@ ROLLOUT, PASS, CEILING = "products of a rollout", "products of a pass", "ceiling
 
 def parse_arguments(argv=None):
     """The command line."""
-    parser = common.parser("training.py", __doc__)
+    parser = common.parser(__doc__)
     parser.add_argument("--hidden-sizes", type=integers, default=(400, 300), metavar="N,N,...")
     parser.add_argument("--num-envs", type=int, default=2048, metavar="N")
     parser.add_argument("--rollout-length", type=int, default=64, metavar="N")
@@ -59,7 +61,8 @@ def integers(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in text.split(","))
 
 
-def main(argv=None):
+@errors.program("training.py")
+def main(argv=None) -> int:
     """Measure all contenders and print the table."""
     arguments = parse_arguments(argv)
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
@@ -74,6 +77,7 @@ def main(argv=None):
     common.print_machine(machine)
     print_table(results)
     common.write_json(arguments.json, {"machine": machine, "results": results})
+    return 0
 
 
 def workloads(arguments, passes: int) -> list[Workload]:
@@ -126,7 +130,7 @@ def prepare_attjax(workload: Workload):
 
     from attjax import assembly, learner, ppo, presets
 
-    settings = dataclasses.replace(presets.PAPER_FAST, **dataclasses.asdict(workload))
+    settings = presets.PAPER_FAST.replace(**dataclasses.asdict(workload))
     setup = assembly.setup(settings)
     env_params = assembly.env_params(setup)
     state = learner.init(setup, env_params, jax.random.key(0))
@@ -192,4 +196,4 @@ def print_table(results: list[dict]) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -23,6 +23,7 @@ PEERS = {
     "export_stablehlo": ["flatbuffers"],
     "export_onnx": ["onnx"],
     "plots": ["matplotlib"],
+    "learning_curve": ["matplotlib"],
 }
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-import eval as eval_script
-import export as export_script
-import train as train_script
+from attjax.commands import eval as eval_script
+from attjax.commands import export as export_script
+from attjax.commands import train as train_script
 
 __all__ = ["eval_script", "export_script", "train_script"]
 

@@ -203,7 +203,7 @@ def _in_float32(flight):
     params = flight.env.default_params
     act = jax.tree_util.Partial(flight.policy.act, flight.params)
     start, steps = evaluation.table_5_slews(), int(params.max_steps_in_episode)
-    history = evaluation.record(act, flight.env, params, start, steps)
+    history = evaluation.record(act, flight.env, params, jax.random.key(0), start, steps)
     angles = jnp.rad2deg(jax.vmap(quaternion.error_angle)(history.quaternion[-1]))
     return ", ".join(f"{angle:.6f}" for angle in angles.tolist())
 

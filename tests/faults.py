@@ -21,11 +21,11 @@ RUNS = [
 ]
 FAULTS = {
     "sign of the gyroscopic term": (
-        "dynamics.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
+        "equations.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
         "((i3 - i2) / i1, (i1 - i3) / i2, (i2 - i1) / i3)", PHYSICS,
     ),
     "gyroscopic term of a full tensor without its symmetric part": (
-        "dynamics.py", "factors = factors + factors.swapaxes(1, 2)", "factors = 2 * factors",
+        "equations.py", "factors = factors + factors.swapaxes(1, 2)", "factors = 2 * factors",
         PHYSICS,
     ),
     "missing ½ in the kinematics": (
@@ -33,19 +33,20 @@ FAULTS = {
         PHYSICS,
     ),
     "wrong order in RK4": (
-        "dynamics.py", "k3 = rate(advance(dt / 2, k2))", "k3 = rate(advance(dt / 2, k1))", PHYSICS,
+        "dynamics.py", "k3 = equations.rate(advance(dt / 2, k2))",
+        "k3 = equations.rate(advance(dt / 2, k1))", PHYSICS,
     ),
     "skipped normalisation": (
-        "dynamics.py", "return quaternions.normalize(jnp.stack(state[:4]))",
-        "return (jnp.stack(state[:4]))", PHYSICS,
+        "dynamics.py", "return quaternions.normalize(quaternion)", "return (quaternion)", PHYSICS,
     ),
     "one coasting step too many": (
-        "dynamics.py", "indices = jnp.arange(frameskip,", "indices = jnp.arange(frameskip + 1,",
+        "dynamics.py", "jnp.arange(agent_step.frameskip,", "jnp.arange(agent_step.frameskip + 1,",
         PHYSICS,
     ),
     "torque twice as strong": (
-        "dynamics.py", "change = call(_torque_step, *start, *acceleration, *gyroscopic)",
-        "change = call(_torque_step, *start, *(2 * a for a in acceleration), *gyroscopic)", PHYSICS,
+        "dynamics.py", "change = call(_first_step, start, equations)",
+        "change = call(_first_step, start, equations._replace("
+        "torque=add(equations.torque, equations.torque)))", PHYSICS,
     ),
     "terminal reward added, not replacing": (
         "reward.py", "jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
@@ -67,8 +68,8 @@ FAULTS = {
         "losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", ["test_losses.py"],
     ),
     "annealing off by one": (
-        "learner.py", "gradient_steps = settings.num_updates * settings.passes",
-        "gradient_steps = (settings.num_updates - 1) * settings.passes", LEARNING,
+        "learner.py", "settings.final_learning_rate, settings.gradient_steps",
+        "settings.final_learning_rate, settings.gradient_steps - settings.minibatches", LEARNING,
     ),
     "key reused from update to update": (
         "rollout.py", "return learner.replace(key=key), steps", "return learner, steps", LEARNING,
@@ -87,7 +88,7 @@ FAULTS = {
         "fresh = jax.vmap(reset)(jax.random.split(jax.random.key(0), portion), rows)", LEARNING,
     ),
     "devices draw the same numbers": (
-        "rollout.py", "jax.random.fold_in(device_key, jax.lax.axis_index(vector.AXIS))",
+        "rollout.py", "jax.random.fold_in(device_key, jax.lax.axis_index(sharding.AXIS))",
         "jax.random.fold_in(device_key, 0)", LEARNING,
     ),
     "closest angle is the last": (
@@ -114,7 +115,7 @@ FAULTS = {
         "return 3 * numerics.square_root(jnp.sum(momentum)", ["test_slew_references.py"],
     ),
     "reward_scale ignored": (
-        "rollout.py", "reward * setup.settings.reward_scale", "reward", ["test_rollout.py"],
+        "rollout.py", "*= setup.settings.task.reward_scale", "*= 1.0", ["test_rollout.py"],
     ),
     "max_gradient_norm ignored": (
         "learner.py", "if settings.max_gradient_norm > 0:", "if False:", DESCENT,
@@ -130,7 +131,7 @@ FAULTS = {
         "jnp.stack([pass_key] * settings.passes)", DESCENT,
     ),
     "same shuffle on each device": (
-        "descent.py", "jax.random.fold_in(pass_key, jax.lax.axis_index(vector.AXIS))",
+        "descent.py", "jax.random.fold_in(pass_key, jax.lax.axis_index(AXIS))",
         "jax.random.fold_in(pass_key, 0)", DESCENT,
     ),
     "approximate KL without its ratio": (
@@ -154,7 +155,7 @@ FAULTS = {
         "    return restored.replace(optimizer=template.optimizer, key=", RUNS,
     ),
     "rows after the checkpoint kept": (
-        "metrics.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
+        "metrics_file.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
     ),
     "no lock on the folder": (
         "run_folder.py", "fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,

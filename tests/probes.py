@@ -49,6 +49,9 @@ class Probe:
         state = ProbeState(jnp.stack([sign, 0.0]), jnp.zeros((), jnp.int32))
         return state.observation, state
 
+    def starts_whole(self, state):
+        return state.time == 0
+
     def step_env(self, key, state, action, params):
         time = state.time + 1
         sign = state.observation[0]

@@ -1,11 +1,10 @@
 """Small training setups that several test files share."""
 
-import dataclasses
 import functools
 
 from jax.sharding import PartitionSpec
 
-from attjax import assembly, learner, presets, vector
+from attjax import assembly, learner, presets, sharding
 from attjax.rollout import rollout
 
 SMALL = {
@@ -23,7 +22,7 @@ SMALL = {
 def settings(updates, preset=presets.PAPER_FAST, **overrides):
     values = SMALL | overrides
     steps = values["num_envs"] * values["rollout_length"] * updates
-    return dataclasses.replace(preset, total_steps=steps, **values)
+    return preset.replace(total_steps=steps, **values)
 
 
 def small_attitude_setup(updates, preset=presets.PRECISE, **overrides):
@@ -34,5 +33,6 @@ def small_attitude_setup(updates, preset=presets.PRECISE, **overrides):
 def fly(setup, env_params, state):
     """The learner and the steps of one rollout."""
     on_device = functools.partial(rollout, setup, env_params)
-    out_specs = (learner.LEARNER_SPECS, PartitionSpec(None, vector.AXIS))
-    return learner.on_devices(setup, on_device, (learner.LEARNER_SPECS,), out_specs)(state)
+    out_specs = (learner.LEARNER_SPECS, PartitionSpec(None, sharding.AXIS))
+    in_specs = (learner.LEARNER_SPECS,)
+    return sharding.on_devices(setup.num_devices, on_device, in_specs, out_specs)(state)

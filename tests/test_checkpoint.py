@@ -8,8 +8,7 @@ import pytest
 from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, presets, run_folder
 from attjax.run_folder import Config, FolderError
 
-SETTINGS = dataclasses.replace(
-    presets.PRECISE,
+SETTINGS = presets.PRECISE.replace(
     frameskips=(5, 20),
     num_envs=8,
     rollout_length=4,
@@ -125,7 +124,7 @@ def test_other_networks_are_refused_in_one_line(trained, tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(trained[0], folder)
     for sizes in ((16,), (8, 8)):
-        settings = dataclasses.replace(SETTINGS, hidden_sizes=sizes)
+        settings = SETTINGS.replace(hidden_sizes=sizes)
         run_folder.write_config(folder, dataclasses.replace(CONFIG, settings=settings))
         with pytest.raises(FolderError, match="cannot be read") as error:
             checkpoint.restore_policy(folder)

@@ -160,7 +160,7 @@ def test_a_larger_total_anneals_on_and_says_so(trained, tmp_path, capsys):
     output = capsys.readouterr().out
     assert "total steps raised from 7,680 to 15,360" in output
     assert "at 7,680 the learning rate goes from 1e-06 to 0.001, and" in output
-    assert run_folder.read_config(folder).settings.total_steps == 15_360
+    assert run_folder.read_config(folder).settings.ppo.total_steps == 15_360
     assert checkpoint.latest(folder) == 120
 
 
@@ -223,13 +223,13 @@ def test_a_signal_before_the_first_block_saves_the_start(tmp_path, number):
     code = f"""
 import os, sys
 sys.path.insert(0, {str(ROOT)!r})
-from attjax import cli
+from attjax import devices
 import train
-select = cli.select_device
+select = devices.select_device
 def select_device(name):
     os.kill(os.getpid(), {int(number)})
     return select(name)
-cli.select_device = select_device
+devices.select_device = select_device
 sys.exit(train.main(sys.argv[1:]))
 """
     folder = tmp_path / "run"

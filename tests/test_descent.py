@@ -10,10 +10,11 @@ from jax.flatten_util import ravel_pytree
 from jax.sharding import PartitionSpec
 from setups import small_attitude_setup
 
-from attjax import descent, learner
+from attjax import descent, learner, sharding
 from attjax.networks import Inputs
 
 ACTIONS = 19
+WEIGHTS = descent.LossWeights(clip=0.2, entropy=0.0)
 
 
 def small_setup(num_devices=1, **overrides):
@@ -52,8 +53,8 @@ def new_learner(setup, update=0):
         }
 
     params = {"policy": network(ACTIONS), "value": network(1)}
-    adam = learner.optimizer(setup.settings)
-    none = jnp.zeros(setup.settings.num_envs)
+    adam = learner.optimizer(setup.settings.ppo)
+    none = jnp.zeros(setup.settings.ppo.num_envs)
     return learner.Learner(
         params=params,
         optimizer={name: adam.init(ravel_pytree(x)[0]) for name, x in params.items()},
@@ -69,10 +70,12 @@ def new_learner(setup, update=0):
 def optimized(setup, samples, update=0):
     """The learner before, the one after and the metrics."""
     before = new_learner(setup, update)
-    specs = (learner.LEARNER_SPECS, learner.SPLIT)
-    run = learner.on_devices(
-        setup,
-        lambda before, samples: descent.optimize(setup, before, samples),
+    specs = (learner.LEARNER_SPECS, sharding.SPLIT)
+    run = sharding.on_devices(
+        setup.num_devices,
+        lambda before, samples: descent.optimize(
+            setup.policy, setup.settings.ppo, before, samples, setup.num_devices
+        ),
         specs,
         (learner.LEARNER_SPECS, PartitionSpec()),
     )
@@ -110,8 +113,8 @@ class Minibatches:
     def __init__(self):
         self.taken = []
 
-    def loss(self, setup, params, sample, entropy_weight):
-        device = jax.lax.axis_index(descent.vector.AXIS)
+    def loss(self, policy, params, sample, weights):
+        device = jax.lax.axis_index(sharding.AXIS)
         jax.debug.callback(self._keep, device, sample.action, sample.advantage, sample.target)
         nothing = sum(jnp.sum(0 * x) for x in jax.tree.leaves(params))
         return nothing, {"mean": jnp.mean(sample.target)}
@@ -215,7 +218,7 @@ def test_a_gradient_step_is_adams_along_the_loss_written_out(x64, normalize, max
     if normalize:
         advantage = (advantage - advantage.mean()) / advantage.std()
     gradients, expected = jax.grad(written_out_loss, has_aux=True)(
-        before.params, samples, advantage, setup.settings.clip, 0.3
+        before.params, samples, advantage, setup.settings.ppo.clip, 0.3
     )
     for name, gradient in gradients.items():
         gradient, _ = ravel_pytree(gradient)
@@ -227,7 +230,7 @@ def test_a_gradient_step_is_adams_along_the_loss_written_out(x64, normalize, max
         np.testing.assert_allclose(adam.mu, 0.1 * gradient, rtol=1e-6, atol=1e-12)
         np.testing.assert_allclose(adam.nu, 0.001 * gradient**2, rtol=1e-6, atol=1e-15)
         moved = [ravel_pytree(x.params[name])[0] for x in (before, after)]
-        step = setup.settings.learning_rate * gradient / (abs(gradient) + 1e-8)
+        step = setup.settings.ppo.learning_rate * gradient / (abs(gradient) + 1e-8)
         np.testing.assert_allclose(moved[0] - moved[1], step, rtol=1e-6, atol=1e-12)
     for name, value in expected.items():
         assert float(metrics[name]) == pytest.approx(float(value), rel=1e-6), name
@@ -241,7 +244,7 @@ def test_explained_variance_of_a_constant_target():
     constant = samples.replace(
         target=jnp.ones(4), inputs=samples.inputs.replace(features=jnp.ones((4, 11)))
     )
-    _, metrics = descent.loss(setup, params, constant, 0.0)
+    _, metrics = descent.loss(setup.policy, params, constant, WEIGHTS)
     assert float(metrics["explained_variance"]) == pytest.approx(1, abs=1e-2)
-    _, metrics = descent.loss(setup, params, samples.replace(target=jnp.ones(4)), 0.0)
+    _, metrics = descent.loss(setup.policy, params, samples.replace(target=jnp.ones(4)), WEIGHTS)
     assert -np.inf < float(metrics["explained_variance"]) < -1e6  # a value that is not

@@ -1,7 +1,6 @@
 """The documentation holds: commands and examples run, links lead somewhere, names exist."""
 
 import ast
-import dataclasses
 import doctest
 import io
 import itertools
@@ -15,7 +14,7 @@ from markdown import COMMANDS, FENCE, Page
 
 import attjax
 from attjax.presets import PRESETS
-from attjax.settings import Settings
+from attjax.settings import FIELDS
 
 README = Page(ROOT / "README.md")
 INDEX = Page(ROOT / "docs" / "README.md")
@@ -160,7 +159,7 @@ def test_the_table_of_presets_is_of_the_presets():
     rows = re.findall(r"^\| `(\w+)` \| (.+) \|$", text, re.MULTILINE)
     table = {setting: cells.split(" | ") for setting, cells in rows}
     assert set(names) == set(PRESETS)
-    for field in dataclasses.fields(Settings):
+    for field in FIELDS.values():
         values = [shown(getattr(PRESETS[name], field.name)) for name in names]
         if field.name in table or len(set(values)) > 1:
             assert table[field.name] == values, field.name

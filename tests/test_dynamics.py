@@ -2,6 +2,7 @@
 
 import functools
 
+import chex
 import jax
 import jax.numpy as jnp
 import jax.test_util
@@ -11,7 +12,7 @@ from bodies import LM50, random_spacecraft, rotated_inertia
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from attjax import dynamics
+from attjax import dynamics, equations
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -209,16 +210,17 @@ def test_wrong_shapes_and_mixed_types_are_refused():
 @pytest.mark.parametrize("kind", [(0, False), (5, False), (5, True), (45, False)])
 def test_the_loops_for_cpu_do_as_the_plain_scan(x64, inertia, kind):
     """Up to rounding: the compiler contracts products and sums differently."""
-    gyroscopic, acceleration = dynamics._euler_terms(jnp.asarray(inertia, float), jnp.ones(3))
+    motion = equations.EquationsOfMotion.of(jnp.asarray(inertia, float), jnp.ones(3))
     quaternion, rate, _ = random_spacecraft(37)
-    start = (*quaternion.T, *rate.T)
+    start = equations.RigidState.of(quaternion.T, rate.T)
+    agent_step = dynamics.AgentStep(*kind)
     plain, in_line = (
-        jax.jit(jax.vmap(functools.partial(change, kind), (0, None, None, None)))(
-            start, acceleration, gyroscopic, ()
+        jax.jit(jax.vmap(functools.partial(change, agent_step), (0, None, None)))(
+            start, motion, None
         )
         for change in (dynamics._change_by_scan, dynamics._change_in_line)
     )
-    np.testing.assert_allclose(np.stack(in_line), np.stack(plain), rtol=0, atol=1e-15)
+    chex.assert_trees_all_close(in_line, plain, rtol=0, atol=1e-15)
 
 
 def test_spacecraft_of_several_control_rates_share_a_program(x64):

@@ -154,7 +154,7 @@ def test_recorded_steps_are_those_of_the_simulator():
     """Step by step with attjax.step, past the rate limit too: nothing ends."""
     start = evaluation.table_5_slews()
     act = jax.tree_util.Partial(lambda q, _: jnp.where(q[0] > 0, 3, 2))
-    history = evaluation.record(act, ENV, ENV.default_params, start, 32)
+    history = evaluation.record(act, ENV, ENV.default_params, jax.random.key(0), start, 32)
     state, step = jax.tree.map(lambda x: x[2], start), jax.jit(attjax.step)
     for n in range(32):
         action = 3 if state.quaternion[0] > 0 else 2

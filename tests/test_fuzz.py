@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from attjax import presets, training
-from attjax.settings import Settings
+from attjax.settings import FIELDS
 
 NUMBERS = st.one_of(
     st.integers(-3, 3),
@@ -27,7 +27,7 @@ WORDS = st.one_of(
     st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=8),
     st.sampled_from(["paper", "precise", "logarithmic", "multiscale", "cpu", "policy", "--resume"]),
 )
-SETTINGS = ["--" + name.replace("_", "-") for name in Settings.__dataclass_fields__]
+SETTINGS = ["--" + name.replace("_", "-") for name in FIELDS]
 PLAUSIBLE = {"--" + name.replace("_", "-"): value for name, value in vars(presets.PRECISE).items()}
 PLAUSIBLE |= {
     "--preset": "paper", "--seed": 1, "--save-every": 2.5, "--frameskip": 7, "--duration": 1.5,

@@ -142,7 +142,7 @@ def test_the_time_limit_of_the_default_is_hashable():
 
 def test_info_is_gymnaxs_own_unless_more_is_asked_for():
     own = {"terminated", "truncated", "discount"}
-    for describe, more in ((False, set()), (True, {"score", "outcome"})):
+    for describe, more in ((False, set()), (True, {"score", "torque", "outcome"})):
         env = GymnaxEnv(describe=describe)
         _, state = env.reset(KEY)
         fast = state.replace(angular_velocity=jnp.array([0.6, 0.0, 0.0]))

@@ -1,6 +1,5 @@
 """--help and --print-config: every setting explained, in any terminal."""
 
-import dataclasses
 import os
 import re
 import subprocess
@@ -10,10 +9,10 @@ import time
 import pytest
 from commands import ROOT, TINY, eval_script, export_script, run, train_script
 
-from attjax import config_file, help_text, presets, run_folder, settings
+from attjax import config_file, fields, help_text, presets, run_folder, settings, streams
 
 SCRIPTS = {"train.py": train_script, "eval.py": eval_script, "export.py": export_script}
-FIELDS = dataclasses.fields(settings.Settings)
+FIELDS = settings.FIELDS.values()
 SYMBOLS = {
     "discount": "γ", "gae_lambda": "λ", "clip": "ε", "entropy_coefficient": "c",
     "final_entropy_coefficient": "c", "num_envs": "M", "passes": "N", "max_episode_steps": "T",
@@ -44,7 +43,7 @@ def flag_of(field):
 @pytest.mark.parametrize("field", FIELDS, ids=lambda field: field.name)
 def test_a_setting_has_a_group_a_meaning_and_its_true_defaults(field, capsys, monkeypatch):
     text = help_of("train.py", capsys, monkeypatch)
-    title = settings.GROUPS[field.metadata["group"]]
+    title = fields.GROUPS[field.metadata["group"]]
     group = text[text.index(f"\n{title}:\n") :].split("\n\n")[0]
     shown = entry(group + "\n\n", flag_of(field))
     assert len(field.metadata["help"]) > 10 and field.metadata["help"] in shown
@@ -126,9 +125,9 @@ def test_a_printed_file_is_ascii_and_explains_every_setting():
             assert lines[i - 1].startswith("# ") and not lines[i - 1].startswith("# ---")
     flat = text.replace("\n# ", " ")
     for field in FIELDS:
-        assert help_text.plain(help_text.meaning(field)) in flat
-        assert settings.limits(field) in flat
-    for title in settings.GROUPS.values():
+        assert streams.plain(help_text.meaning(field)) in flat
+        assert fields.limits(field) in flat
+    for title in fields.GROUPS.values():
         assert f"# --- {title} ---" in lines
 
 

@@ -1,9 +1,120 @@
-import csv
+"""A row of metrics, metrics.csv, and the registry that all that shows metrics is made from."""
 
+import csv
+import io
+import re
+
+import jax
 import jax.numpy as jnp
 import pytest
+from commands import ROOT
+from rich.console import Console
+from setups import small_attitude_setup
 
-from attjax import metrics, run_folder
+from attjax import assembly, learner, metrics, metrics_file, panel, ppo, progress_status, run_folder
+
+EPISODE = metrics.Metric(
+    name="closest_deg", meaning="a mean over episodes", mean_of="closest_deg",
+    tag="episode/closest", is_compared=True,
+    cell=metrics.Cell("closest", "{:.1f}°", (0, 3), is_in_line=True),
+    curve=metrics.Curve("closest error (°)"),
+)  # fmt: skip
+LOSS = metrics.Metric(
+    name="gradient_norm", meaning="a loss", tag="loss/gradient_norm",
+    cell=metrics.Cell("gradient", "{:.2f}", (2, 3)),
+)  # fmt: skip
+
+
+@pytest.fixture
+def two_more(monkeypatch):
+    """The registry with two more metrics, which nothing else in the package hears of."""
+    monkeypatch.setattr(metrics, "METRICS", (*metrics.METRICS, EPISODE, LOSS))
+
+
+def row_of_two_more():
+    names = ("score", "score_squared", "success_rate", "overspeed_rate", "terminal_error_deg")
+    block = block_metrics(episodes=[2], closest_deg=[25], **{name: [2] for name in names})
+    block["losses"] = {"gradient_norm": jnp.array(0.5)}
+    return metrics.block_row(block, (5,), 100, 1.5)
+
+
+def test_a_metric_of_the_registry_is_a_column(two_more, tmp_path):
+    file = metrics_file.MetricsFile(tmp_path, 0)
+    file.append(row_of_two_more())
+    (row,) = rows_of(tmp_path)
+    assert list(row)[-2:] == ["closest_deg", "gradient_norm"]
+    assert (row["closest_deg"], row["gradient_norm"]) == ("12.5", "0.5")
+
+
+def test_a_metric_of_the_registry_is_on_the_panel_and_in_the_lines(two_more):
+    status = progress_status.Status(1000, 0)
+    status.start(0.0)
+    status.add(row_of_two_more(), 1.0)
+    console = Console(width=80, record=True, force_terminal=True, file=io.StringIO())
+    console.print(panel.Panel(status))
+    lines = console.export_text().splitlines()
+    assert len(lines) == 5
+    assert re.fullmatch(r"closest +12.5° ▁ {26,}gradient +0.50", lines[4])
+    line = progress_status.line(status, 1.0)
+    assert line.endswith("  closest 12.5°") and "gradient" not in line
+
+
+def test_every_cell_has_a_place_of_its_own_on_the_panel():
+    places = [metric.cell.place for metric in metrics.METRICS if metric.cell]
+    assert len(set(places)) == len(places)
+    assert max(column for column, _ in places) < len(panel.WIDTHS)
+
+
+def test_a_metric_of_the_registry_is_a_curve_in_tensorboard(two_more, tmp_path):
+    pytest.importorskip("tensorboardX")
+    from test_tensorboard import CONFIG, compared, points
+
+    from attjax import tensorboard
+
+    tensorboard.EventFile(tmp_path, CONFIG, []).append(row_of_two_more())
+    found = points(tmp_path)
+    assert found["episode/closest"] == [(100, 12.5)] and found["loss/gradient_norm"] == [(100, 0.5)]
+    assert compared(tmp_path)[-1] == "episode/closest"
+
+
+def test_a_metric_of_the_registry_is_in_the_figure(two_more, tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    from attjax import canvas, learning_curve
+
+    figures = []
+    monkeypatch.setattr(canvas, "save", lambda figure, *_: figures.append(figure))
+    row = {name: str(value) for name, value in row_of_two_more().items()}
+    learning_curve.write([row], True, tmp_path)
+    assert [axis.get_ylabel() for axis in figures[0].axes] == [
+        "return (Eq. 12–13)", "success rate", "terminal error (°)", "closest error (°)"
+    ]  # fmt: skip
+
+
+def test_rows_of_before_a_metric_are_read_and_gone_on_from(tmp_path, monkeypatch):
+    metrics_file.MetricsFile(tmp_path, 0).append({"agent_steps": 100, "wall_s": 1.5})
+    monkeypatch.setattr(metrics, "METRICS", (*metrics.METRICS, EPISODE, LOSS))
+    file = metrics_file.MetricsFile(tmp_path, 100)
+    file.append(row_of_two_more())
+    assert [row["closest_deg"] for row in rows_of(tmp_path)] == ["", "12.5"]
+    assert [row["closest_deg"] for row in file.kept] == [""]
+
+
+def test_training_makes_the_numbers_of_the_registry_and_no_others():
+    setup = small_attitude_setup(1)
+    env_params = assembly.env_params(setup)
+    state = learner.init(setup, env_params, jax.random.key(0))
+    _, block = ppo.train_block.eval_shape(setup, env_params, state, 1)
+    of_means = {metric.name for metric in metrics.METRICS if metric.mean_of}
+    assert {metric.mean_of for metric in metrics.METRICS} - {None} <= set(block["episodes"])
+    ready = {"agent_steps", "wall_s", "episodes", "episode_return_std", "episode_return_n"}
+    assert set(metrics.columns()) == ready | of_means | set(block["losses"])
+
+
+def test_the_documentation_has_the_registry():
+    text = (ROOT / "docs" / "logs.md").read_text()
+    table = text[text.index("| Column |") :].split("\n\n")[0].splitlines()[2:]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
+    assert rows == [[f"`{m.name}`", m.meaning, m.unit] for m in metrics.METRICS]
 
 
 def block_metrics(**episodes):
@@ -45,10 +156,10 @@ def rows_of(folder):
 
 
 def test_resuming_drops_the_rows_after_the_checkpoint(tmp_path):
-    file = metrics.MetricsFile(tmp_path, resume_at=0)
+    file = metrics_file.MetricsFile(tmp_path, resume_at=0)
     for steps in (100, 200, 300):
         file.append({"agent_steps": steps, "wall_s": steps / 10, "success_rate": None})
-    resumed = metrics.MetricsFile(tmp_path, resume_at=200)
+    resumed = metrics_file.MetricsFile(tmp_path, resume_at=200)
     assert resumed.wall_s == 20
     assert [row["agent_steps"] for row in rows_of(tmp_path)] == ["100", "200"]
     resumed.append({"agent_steps": 300, "wall_s": 31.0})
@@ -56,12 +167,12 @@ def test_resuming_drops_the_rows_after_the_checkpoint(tmp_path):
 
 
 def test_a_row_that_was_cut_off_is_left_out(tmp_path):
-    file = metrics.MetricsFile(tmp_path, resume_at=0)
+    file = metrics_file.MetricsFile(tmp_path, resume_at=0)
     for steps in (100, 200):
         file.append({"agent_steps": steps, "wall_s": steps / 10})
     path = tmp_path / run_folder.METRICS
     path.write_text(path.read_text() + "20")  # of 200 to 300: would pass for the 20th step
-    metrics.MetricsFile(tmp_path, resume_at=200)
+    metrics_file.MetricsFile(tmp_path, resume_at=200)
     assert [row["agent_steps"] for row in rows_of(tmp_path)] == ["100", "200"]
 
 
@@ -70,5 +181,5 @@ def test_files_that_are_no_metrics_are_refused_and_kept(tmp_path, text):
     path = tmp_path / run_folder.METRICS
     path.write_text(text)
     with pytest.raises(run_folder.FolderError, match=r"metrics\.csv cannot be read"):
-        metrics.MetricsFile(tmp_path, resume_at=10)
+        metrics_file.MetricsFile(tmp_path, resume_at=10)
     assert path.read_text() == text

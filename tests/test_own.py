@@ -1,6 +1,5 @@
 """A user's own spacecraft, reward and features, from the command line."""
 
-import dataclasses
 import json
 import sys
 
@@ -50,9 +49,7 @@ def test_a_policy_flies_the_spacecraft_that_it_was_trained_on(own, tmp_path):
 def test_the_users_functions_are_what_learns(monkeypatch):
     """The reward that reaches the learner and the network's inputs are the user's."""
     monkeypatch.syspath_prepend(str(EXAMPLES))
-    settings = dataclasses.replace(
-        presets.PRECISE, reward="rewards:frugal", features="rewards:with_momentum"
-    )
+    settings = presets.PRECISE.replace(reward="rewards:frugal", features="rewards:with_momentum")
     env, policy = (getattr(assembly.setup(settings), name) for name in ("env", "policy"))
     params = env.default_params
     observation, state = env.reset(jax.random.key(0), params)

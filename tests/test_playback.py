@@ -42,7 +42,7 @@ def test_the_page_holds_the_recorded_flights():
     )
     for samples, controller in zip(data["flights"].swapaxes(0, 1), CONTROLLERS.values()):
         samples = samples.swapaxes(0, 1)  # (steps + 1, slews, 10)
-        history = evaluation.record(controller, env, params, starts, 80)
+        history = evaluation.record(controller, env, params, jax.random.key(3), starts, 80)
         np.testing.assert_array_equal(samples[0, :, :4], starts.quaternion)
         np.testing.assert_array_equal(samples[0, :, 4:7], 0)
         np.testing.assert_array_equal(samples[1:, :, :4], history.quaternion)

@@ -5,13 +5,16 @@ import numpy as np
 import pytest
 from matplotlib import image
 
-from attjax import AttitudeEnv, controllers, evaluation, plots
+from attjax import AttitudeEnv, controllers, evaluation, learning_curve, plots
 from attjax import quaternion as quaternions
 from attjax.controllers import average_torque
 from attjax.spacecraft import EnvState
 
 ENV = AttitudeEnv(frameskip=5)
 CONTROLLER = jax.tree_util.Partial(controllers.phase_plane)
+COLUMNS = ("agent_steps", "episode_return", "success_rate", "terminal_error_deg")
+ROWS = [("1000", "", "", ""), ("2000", "100", "0.1", "20"), ("3000", "900", "0.5", "1")]
+CURVE = [dict(zip(COLUMNS, row)) for row in ROWS]
 
 
 def fly():
@@ -26,11 +29,8 @@ def flight():
 
 
 def test_every_figure_is_written(flight, tmp_path):
-    names = ("agent_steps", "episode_return", "success_rate", "terminal_error_deg")
-    rows = [("1000", "", "", ""), ("2000", "100", "0.1", "20"), ("3000", "900", "0.5", "1")]
-    metrics = [dict(zip(names, row)) for row in rows]
     folder = tmp_path / "figures"
-    written = plots.write_all(flight, folder, metrics)
+    written = plots.write_all(flight, folder) + learning_curve.write(CURVE, True, folder)
     names = {path.stem for path in written}
     assert names == {
         "slew1", "slew2", "slew3", "error_histories", "distributions", "settling",
@@ -52,11 +52,9 @@ def test_a_figure_is_the_same_in_any_style_of_the_user(flight, tmp_path):
         assert {name: matplotlib.rcParams[name] for name in hostile} == hostile
 
 
-def test_a_run_in_which_no_episode_ended_has_no_learning_curve(flight, tmp_path, monkeypatch):
-    for name in ("slews", "final_seconds", "error_histories", "distributions", "settling"):
-        monkeypatch.setattr(plots, name, lambda *_: ())
+def test_a_run_in_which_no_episode_ended_has_no_learning_curve(tmp_path):
     rows = [{"agent_steps": "1000", "episode_return": ""}]
-    assert plots.write_all(flight, tmp_path, rows) == [(), (), (), ()]
+    assert learning_curve.write(rows, True, tmp_path) == [] == list(tmp_path.iterdir())
 
 
 def test_recorded_slews_are_the_flown_ones(x64):
@@ -95,7 +93,7 @@ def test_time_optimal_reference_of_table_5():
 
 def test_record_keeps_every_step():
     start = EnvState(jnp.array([[0.0, 0, 0, 1]]), jnp.zeros((1, 3)), jnp.zeros(1, jnp.int32))
-    history = evaluation.record(CONTROLLER, ENV, ENV.default_params, start, 7)
+    history = evaluation.record(CONTROLLER, ENV, ENV.default_params, jax.random.key(0), start, 7)
     assert history.quaternion.shape == (7, 1, 4)
     assert history.angular_velocity.shape == history.torque.shape == (7, 1, 3)
     assert not history.torque.any()

@@ -9,13 +9,13 @@ from jax.sharding import PartitionSpec
 from probes import Probe
 from setups import fly, settings, small_attitude_setup
 
-from attjax import AttitudeEnv, assembly, descent, learner, ppo, presets, vector
+from attjax import AttitudeEnv, assembly, descent, learner, ppo, presets, sharding
 from attjax.networks import Policy
 
 
 def train(setup, env_params):
     state = learner.init(setup, env_params, jax.random.key(0))
-    return ppo.train_block(setup, env_params, state, setup.settings.num_updates)
+    return ppo.train_block(setup, env_params, state, setup.settings.ppo.num_updates)
 
 
 def train_probe(probe, updates=60, num_devices=1, **overrides):
@@ -120,8 +120,8 @@ def test_blocks_of_any_length_give_the_same_bits():
 def test_learning_rate_anneals_over_the_whole_run():
     """Adam's first step moves each parameter by the learning rate; the last by the final one."""
     chosen = settings(3, passes=2, learning_rate=1e-2, final_learning_rate=1e-4)
-    assert (chosen.num_updates, chosen.minibatches) == (3, 8)
-    transformation = learner.optimizer(chosen)
+    assert (chosen.ppo.num_updates, chosen.ppo.minibatches) == (3, 8)
+    transformation = learner.optimizer(chosen.ppo)
     gradient = jnp.ones(())
     state = transformation.init(gradient)
     moves = []
@@ -133,7 +133,7 @@ def test_learning_rate_anneals_over_the_whole_run():
 
 def test_entropy_bonus_anneals_over_the_whole_run():
     chosen = settings(4, entropy_coefficient=0.01, final_entropy_coefficient=0.002)
-    weights = [float(learner.entropy_coefficient(chosen, jnp.int32(i))) for i in range(5)]
+    weights = [float(learner.entropy_coefficient(chosen.ppo, jnp.int32(i))) for i in range(5)]
     np.testing.assert_allclose(weights, [0.01, 0.008, 0.006, 0.004, 0.002], rtol=1e-6)
 
 
@@ -146,8 +146,8 @@ def test_entropy_bonus_is_what_its_weight_takes_off_the_loss():
     inputs = jax.vmap(setup.policy.encode, (0, None))(observation, context)
     old = -jnp.log(19.0) * jnp.ones(5)
     sample = descent.Sample(inputs, jnp.zeros(5, int), old, jnp.arange(5.0), jnp.ones(5))
-    plain, metrics = descent.loss(setup, params, sample, 0.0)
-    rewarded, _ = descent.loss(setup, params, sample, 0.5)
+    plain, metrics = descent.loss(setup.policy, params, sample, descent.LossWeights(0.2, 0.0))
+    rewarded, _ = descent.loss(setup.policy, params, sample, descent.LossWeights(0.2, 0.5))
     assert metrics["entropy"] == pytest.approx(np.log(19), rel=1e-2)
     assert plain - rewarded == pytest.approx(0.5 * float(metrics["entropy"]), rel=1e-5)
 
@@ -195,15 +195,17 @@ def on_samples(setup, env_params, state, steps):
 
     def on_device(state, steps):
         samples = ppo.with_advantages(setup, env_params, state, steps)
-        return descent.optimize(setup, state, samples)[0].optimizer
+        return descent.optimize(
+            setup.policy, setup.settings.ppo, state, samples, setup.num_devices
+        )[0].optimizer
 
-    split = PartitionSpec(None, vector.AXIS)
+    split = PartitionSpec(None, sharding.AXIS)
     specs = (learner.LEARNER_SPECS, split)
-    return learner.on_devices(setup, on_device, specs, PartitionSpec())(state, steps)
+    return sharding.on_devices(setup.num_devices, on_device, specs, PartitionSpec())(state, steps)
 
 
 def test_small_minibatches_are_not_shared_out():
     assert len(jax.devices()) == 2
     assert assembly.num_devices(presets.PRECISE) == 2
     assert assembly.num_devices(presets.PAPER_FAST) == 1
-    assert assembly.num_devices(dataclasses.replace(presets.PRECISE, num_envs=2047)) == 1
+    assert assembly.num_devices(presets.PRECISE.replace(num_envs=2047)) == 1

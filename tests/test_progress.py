@@ -14,7 +14,7 @@ import pytest
 from commands import ROOT
 from rich.console import Console
 
-from attjax import metrics, panel, progress
+from attjax import metrics, panel, progress, progress_status
 
 LOSSES = {
     "entropy": 2.345, "approximate_kl": 0.00123, "clip_fraction": 0.043, "policy_loss": -0.01,
@@ -36,11 +36,13 @@ def clock(monkeypatch):
 
 
 def row(steps, **values):
-    return dict.fromkeys(metrics.COLUMNS) | {"agent_steps": steps, "episodes": 0} | LOSSES | values
+    return (
+        dict.fromkeys(metrics.columns()) | {"agent_steps": steps, "episodes": 0} | LOSSES | values
+    )
 
 
 def status(*rows, total=40_000_000):
-    made = progress.Status(total, 0)
+    made = progress_status.Status(total, 0)
     made.start(1000.0)
     for i, each in enumerate(rows):
         made.add(each, 1000.0 + i + 1)
@@ -88,7 +90,7 @@ def test_the_panel_has_nothing_to_say_at_first(clock):
 def test_values_stay_until_there_are_new_ones(clock):
     shown = status(row(4e6, **EPISODES), row(8e6))
     assert "98.4%" in "".join(screen(panel.Panel(shown), 80))
-    assert "success 98.4%" in progress.line(shown, 1002.0)
+    assert "success 98.4%" in progress_status.line(shown, 1002.0)
 
 
 def test_a_run_that_goes_on_shows_what_it_knew():
@@ -103,21 +105,21 @@ def test_numbers_that_are_not_finite(clock, bad):
     values = dict.fromkeys((*LOSSES, *EPISODES), bad)
     shown = status(row(4e6, **values), row(8e6, **EPISODES), row(12e6, **values))
     assert str(bad) in screen(panel.Panel(shown), 80)[3]
-    assert f"terminal error {bad}°" in progress.line(shown, 1003.0)
+    assert f"terminal error {bad}°" in progress_status.line(shown, 1003.0)
 
 
 def test_lines_explain_themselves_and_fit(clock):
-    text = progress.line(status(row(4e6)), 1001.0)
+    text = progress_status.line(status(row(4e6)), 1001.0)
     assert text.split("  ", 4)[:4] == ["10.0%", "4M/40M steps", "4M/s", "ETA 0:09"]
     assert "no whole episode has ended yet" in text and "–" not in text and "return" not in text
     slow = status(row(12_650_000, **EPISODES), total=10**13)
-    text = progress.line(slow, 1001.0)
+    text = progress_status.line(slow, 1001.0)
     assert "return 13,807  success 98.4%  terminal error 0.000123°  entropy 2.35" in text
     assert len(text) <= 120
 
 
 def test_speed_is_that_of_the_last_minute():
-    shown = progress.Status(10**9, 5000)  # 5,000 before, which this process did not take
+    shown = progress_status.Status(10**9, 5000)  # 5,000 before, which this process did not take
     shown.start(0.0)
     for seconds in range(1, 101):
         shown.add(row(5000 + 100 * seconds), float(seconds))

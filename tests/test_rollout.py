@@ -18,8 +18,8 @@ def test_spacecraft_are_shared_out_among_the_control_rates():
     sizes = [group.stop - group.start for group in setup.slices]
     assert sum(sizes) == 64 and set(sizes) == {12, 13}
     env_params = assembly.env_params(setup)
-    discounts = ppo.discounts(setup, env_params)
-    features = encode(setup, env_params, jnp.zeros((64, 11))).features
+    discounts = ppo.discounts(setup.env, env_params, setup.settings.ppo, 64)
+    features = encode(setup.env, setup.policy, env_params, jnp.zeros((64, 11))).features
     for frameskip, group in zip((5, 7, 10, 14, 20), setup.slices):
         assert set(env_params.frameskip[group].tolist()) == {frameskip}
         period = (1 + frameskip) / 240
@@ -31,12 +31,12 @@ def test_every_control_rate_has_spacecraft_on_any_number_of_devices(monkeypatch)
     for devices in range(1, 9):
         monkeypatch.setattr(jax, "devices", lambda *_, devices=devices: [None] * devices)
         for num_envs in (5, 6, 8, 16, 64):
-            settings = dataclasses.replace(
-                presets.PRECISE, num_envs=num_envs, rollout_length=4096, minibatch_size=4096
+            settings = presets.PRECISE.replace(
+                num_envs=num_envs, rollout_length=4096, minibatch_size=4096
             )
             setup = assembly.setup(settings, num_devices=assembly.num_devices(settings))
             assert all(group.start < group.stop for group in setup.slices), (devices, num_envs)
-    settings = dataclasses.replace(settings, num_envs=6)
+    settings = settings.replace(num_envs=6)
     with pytest.raises(ValueError, match="num_devices is 2, for 3 spacecraft each; they must be"):
         assembly.setup(settings, num_devices=2)
 
@@ -63,7 +63,7 @@ def test_a_share_of_the_spacecraft_acts_greedily(share):
         state.params, steps.inputs
     )
     is_most_probable = steps.action == jnp.argmax(log_probabilities, axis=1)
-    greedy = greedy_rows(setup)
+    greedy = greedy_rows(64, share)
     assert [greedy[group].sum() for group in setup.slices] == [32 * share, 32 * share]
     assert is_most_probable[:, greedy].all()
     # An untrained policy is close to uniform over 19 actions.
@@ -89,7 +89,7 @@ def test_only_whole_episodes_count_in_the_metrics():
     ends = [np.flatnonzero(column) for column in np.asarray(steps.truncated).T]
     lengths = np.concatenate([np.diff(rows, prepend=-1) for rows in ends])
     assert set(lengths.tolist()) == {3, 10}
-    sums = episode_sums(setup, steps)
+    sums = episode_sums(steps, setup.slices)
     assert sums["episodes"] == (lengths == 10).sum()
     whole = steps.truncated & steps.is_whole
     assert sums["terminal_error_deg"] == pytest.approx(
@@ -113,7 +113,7 @@ def test_staggered_episodes_start_at_random_times():
     times = learner.init(staggered, env_params, jax.random.key(0)).states.time
     assert len(set(times.tolist())) > 5 and int(times.max()) < 700
     together = dataclasses.replace(
-        staggered, settings=dataclasses.replace(staggered.settings, stagger_episodes=False)
+        staggered, settings=staggered.settings.replace(stagger_episodes=False)
     )
     assert not learner.init(together, env_params, jax.random.key(0)).states.time.any()
 
@@ -148,7 +148,7 @@ def test_devices_hold_the_control_rates_of_their_part():
     before = state.states
     _, steps = fly(setup, env_params, state)
     first = jax.tree.map(lambda x: x[0], steps)
-    for group, frameskip in enumerate(setup.settings.frameskips):
+    for group, frameskip in enumerate(setup.settings.task.frameskips):
         rows = np.flatnonzero(np.tile(setup.group_of_row, 2) == group)
         start, action = jax.tree.map(lambda x, rows=rows: x[rows], (before, first.action))
         step = jax.vmap(attjax.step, (0, 0, None, None))

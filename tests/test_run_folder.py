@@ -6,11 +6,13 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from test_checkpoint import CONFIG
 
 from attjax import run_folder
+from attjax.presets import PRECISE
 from attjax.run_folder import FolderError
 
 
@@ -37,6 +39,39 @@ def test_a_run_is_not_overwritten_unless_asked(tmp_path):
     with pytest.raises(FolderError, match=r"--resume .* --overwrite"):
         run_folder.create(tmp_path, CONFIG, overwrite=False)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["3", "config.json"]
+
+
+def as_format_5(folder):
+    """Rewrite a run's config.json as versions did that had the settings in one table."""
+    content = json.loads((folder / "config.json").read_text())
+    settings = {k: x for subject in content["settings"].values() for k, x in subject.items()}
+    content |= {"format": 5, "settings": settings}
+    (folder / "config.json").write_text(json.dumps(content))
+
+
+def test_a_run_of_format_5_is_read_as_it_was_meant(tmp_path):
+    run_folder.create(tmp_path, CONFIG, overwrite=False)
+    as_format_5(tmp_path)
+    assert run_folder.read_config(tmp_path) == CONFIG
+    run_folder.write_config(tmp_path, CONFIG)
+    assert json.loads((tmp_path / "config.json").read_text())["format"] == 6
+    assert run_folder.read_config(tmp_path) == CONFIG
+
+
+def test_the_pretrained_run_is_of_format_5():
+    folder = Path(__file__).parents[1] / "pretrained" / "precise"
+    assert json.loads((folder / "config.json").read_text())["format"] == 5
+    config = run_folder.read_config(folder)
+    assert (config.preset, config.seed, config.settings) == ("precise", 2, PRECISE)
+
+
+def test_format_5_is_refused_where_it_is_wrong(tmp_path):
+    run_folder.create(tmp_path, CONFIG, overwrite=False)
+    as_format_5(tmp_path)
+    path = tmp_path / "config.json"
+    path.write_text(path.read_text().replace('"gae_lambda"', '"lambda"'))
+    with pytest.raises(FolderError, match="gae_lambda, lambda"):
+        run_folder.read_config(tmp_path)
 
 
 def test_a_run_of_an_older_format_can_be_overwritten(tmp_path):

@@ -11,38 +11,38 @@ from attjax.presets import PAPER, PAPER_FAST, PRECISE, PRESETS
 def test_paper_presets_hold_what_the_paper_names():
     """Tables 3 and 4, section 2.5."""
     for preset in (PAPER, PAPER_FAST):
-        assert preset.hidden_sizes == (400, 300)
-        assert (preset.discount, preset.discount_period) == (0.99, 0)
-        assert (preset.learning_rate, preset.final_learning_rate) == (3e-4, 1e-5)
-        assert (preset.clip, preset.entropy_coefficient) == (0.2, 1e-4)
-        assert (preset.frameskips, preset.reward, preset.features) == ((20,), "paper", "state")
-        assert preset.time_limit_terminates and preset.rate_margin == 0
-    assert (PAPER.num_envs, PAPER.rollout_length, PAPER.minibatch_size) == (30, 500, 128)
-    assert PAPER.num_updates == 4340 and PAPER.gae_lambda == 1
+        task, network, ppo = preset.task, preset.network, preset.ppo
+        assert network.hidden_sizes == (400, 300)
+        assert (ppo.discount, ppo.discount_period) == (0.99, 0)
+        assert (ppo.learning_rate, ppo.final_learning_rate) == (3e-4, 1e-5)
+        assert (ppo.clip, ppo.entropy_coefficient) == (0.2, 1e-4)
+        assert (task.frameskips, task.reward, network.features) == ((20,), "paper", "state")
+        assert task.time_limit_terminates and network.rate_margin == 0
+    ppo = PAPER.ppo
+    assert (ppo.num_envs, ppo.rollout_length, ppo.minibatch_size) == (30, 500, 128)
+    assert ppo.num_updates == 4340 and ppo.gae_lambda == 1
 
 
 @pytest.mark.parametrize("preset", PRESETS.values())
 def test_settings_survive_json(preset):
-    chosen = dataclasses.replace(preset, num_envs=64, total_steps=123)
+    chosen = preset.replace(num_envs=64, total_steps=123)
     restored = settings.from_json(json.loads(json.dumps(dataclasses.asdict(chosen))))
     assert restored == chosen
 
 
 def test_total_steps_round_up_to_whole_updates():
-    chosen = dataclasses.replace(
-        PRECISE, num_envs=10, rollout_length=10, minibatch_size=10, total_steps=101
-    )
-    assert chosen.num_updates == 2 and chosen.minibatches == 10
+    chosen = PRECISE.replace(num_envs=10, rollout_length=10, minibatch_size=10, total_steps=101)
+    assert chosen.ppo.num_updates == 2 and chosen.ppo.minibatches == 10
 
 
 @pytest.mark.parametrize("integer", [np.int64, np.uint16, np.array], ids=lambda x: x.__name__)
 def test_numbers_of_numpy_are_numbers(integer):
-    chosen = dataclasses.replace(
-        PRECISE, num_envs=integer(64), frameskips=[integer(5), integer(20)], clip=np.float32(0.25),
+    chosen = PRECISE.replace(
+        num_envs=integer(64), frameskips=[integer(5), integer(20)], clip=np.float32(0.25),
         minibatch_size=integer(64), normalize_advantage=np.True_,
     )  # fmt: skip
-    plain = dataclasses.replace(
-        PRECISE, num_envs=64, frameskips=(5, 20), clip=0.25, minibatch_size=64,
+    plain = PRECISE.replace(
+        num_envs=64, frameskips=(5, 20), clip=0.25, minibatch_size=64,
         normalize_advantage=True,
     )  # fmt: skip
     assert chosen == plain and hash(chosen) == hash(plain)
@@ -72,14 +72,23 @@ def test_numbers_of_numpy_are_numbers(integer):
 )
 def test_bad_values_are_refused_with_what_is_allowed(name, value, allowed):
     with pytest.raises(ValueError) as error:
-        dataclasses.replace(PRECISE, **{name: value})
+        PRECISE.replace(**{name: value})
     assert str(error.value).startswith(name) and allowed in str(error.value)
 
 
 def test_unknown_and_missing_names_are_refused():
     values = dataclasses.asdict(PRECISE)
     with pytest.raises(ValueError, match="gravity"):
-        settings.from_json(values | {"gravity": 1})
-    del values["clip"]
+        settings.from_json(values | {"world": {"gravity": 1}})
+    del values["ppo"]["clip"]
     with pytest.raises(ValueError, match="clip"):
         settings.from_json(values)
+    with pytest.raises(ValueError, match="gravity"):
+        PRECISE.replace(gravity=1)
+
+
+def test_every_name_has_one_subject():
+    subjects = dataclasses.asdict(PRECISE).values()
+    assert sum(map(len, subjects)) == len(settings.FIELDS)
+    assert PRECISE.flat == {name: value for values in subjects for name, value in values.items()}
+    assert PRECISE.replace() == PRECISE and PAPER.replace(**PRECISE.flat) == PRECISE

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import attjax
+from attjax import AttitudeEnv, spacecraft
 from attjax import quaternion as quaternions
-from attjax import spacecraft
 from attjax.specification import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
@@ -163,6 +163,18 @@ def test_a_share_of_none_is_none(monkeypatch):
     assert hash(none) == hash(spacecraft.NearGoalStarts(share=0.0, steps=64))  # a static argument
 
 
+def test_an_environment_says_which_episodes_are_whole():
+    """Those that start at rest, of full length; none of those that start near the goal."""
+    for steps in (64, 10_000):  # longer than an episode, too
+        starts = spacecraft.NearGoalStarts(share=0.5, steps=steps)
+        env = AttitudeEnv(frameskip=20, initial_state=starts)
+        keys = jax.random.split(jax.random.key(0), 200)
+        states = jax.vmap(env.reset, (0, None))(keys, env.default_params)[1]
+        whole = env.starts_whole(states)
+        assert whole.dtype == bool and 50 < whole.sum() < 150
+        np.testing.assert_array_equal(whole, ~states.angular_velocity.any(axis=1))
+
+
 def test_parameters_may_be_arguments_of_a_jitted_step():
     """All but torque_held are traced; what is left out of them is the paper's."""
     whole = spacecraft.default_params(20)
@@ -204,6 +216,22 @@ def test_parameters_at_the_edge_pass_and_beyond_it_are_refused(name, allowed, re
     with pytest.raises(ValueError) as error:
         spacecraft.check_params(params.replace(**{name: refused}), 20)
     assert wrong in str(error.value)
+
+
+def test_a_step_outside_jit_compiles_once(caplog):
+    """And not again for other states, actions and parameters."""
+    starts = [jax.tree.map(lambda x, row=row: x[row], states(3)) for row in range(3)]
+    params = spacecraft.default_params(7)
+
+    def compiled():
+        return [record.getMessage() for record in caplog.records if "ompil" in record.getMessage()]
+
+    with jax.log_compiles():
+        attjax.step(starts[0], 1, params, 7)
+        first = compiled()
+        for start, action, scale in zip(starts[1:], (2, 18), (1.0, 2.0)):
+            attjax.step(start, action, params.replace(inertia=params.inertia * scale), 7)
+    assert len(first) >= 1 and compiled() == first
 
 
 def test_an_action_beyond_the_table_is_refused():

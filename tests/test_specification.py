@@ -1,6 +1,5 @@
 """A user's own spacecraft."""
 
-import dataclasses
 import tomllib
 
 import hypothesis
@@ -177,7 +176,7 @@ def test_bad_descriptions(values, expected):
         specification.from_lists(values)
 
 
-FASTEST = dataclasses.replace(PAPER, frameskips=(0,))
+FASTEST = PAPER.replace(frameskips=(0,))
 ODD = st.sampled_from([None, True, "x", [], {}, -1, 0, 1e-40, 1e40, 10**400, float("nan"), [[1]]])
 THREE = st.lists(st.floats(-1e12, 1e12), min_size=3, max_size=3)
 MOMENTS = st.lists(st.floats(1.0, 2.0), min_size=3, max_size=3)  # any three are a body's

@@ -12,7 +12,7 @@ from commands import ROOT, TINY, eval_script, train_script
 from packaging.requirements import Requirement
 
 SCRIPTS = [ROOT / name for name in ("train.py", "eval.py", "export.py")]
-SOURCES = [*(ROOT / "attjax").glob("*.py"), *SCRIPTS]
+SOURCES = [*(ROOT / "attjax").rglob("*.py"), *SCRIPTS]
 MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
 MODULES |= {"socket", "urllib", "http", "requests", "ftplib"}
 CORE = {"jax", "jaxlib", "flax", "optax", "chex", "numpy", "orbax-checkpoint", "rich"}

@@ -97,8 +97,8 @@ eval.main(["--json", "~/x"])
 
 
 COMPILE = """
-from attjax import cli
-cli.select_device("cpu")
+from attjax import devices
+devices.select_device("cpu")
 import jax
 jax.jit(lambda x: x + 1)(1.0)
 """
@@ -125,8 +125,8 @@ def test_a_damaged_entry_of_the_cache_is_replaced_in_silence(tmp_path):
 def test_plots_need_no_backend_of_the_user(tmp_path, backend):
     code = """
 from pathlib import Path
-import eval
-plots = eval._prepare_plots(Path(sys.argv[1]))
+from attjax.commands import evaluation_output
+plots = evaluation_output.prepare_plots(Path(sys.argv[1]))
 from attjax import canvas
 print(canvas.save(canvas.subplots(figsize=(1, 1))[0], Path(sys.argv[1]), "figure").exists())
 """

@@ -14,7 +14,7 @@ import pytest
 from commands import ROOT, STEPS_PER_UPDATE, TINY, one_line_error, run, train_script
 from test_checkpoint import CONFIG
 
-from attjax import checkpoint, metrics, run_folder
+from attjax import checkpoint, metrics, metrics_file, run_folder
 
 pytest.importorskip("tensorboardX")
 
@@ -49,6 +49,13 @@ def points(folder):
     return curves
 
 
+def compared(folder):
+    """The tags that the tab HPARAMS shows beside the settings."""
+    (value,) = list(records(folder))[2].summary.value
+    data = HParamsPluginData.FromString(value.metadata.plugin_data.content)
+    return [info.name.tag for info in data.experiment.metric_infos]
+
+
 def expected(folder):
     """The same from metrics.csv."""
     with (folder / "metrics.csv").open(newline="") as file:
@@ -56,9 +63,10 @@ def expected(folder):
     curves, last_steps, last_seconds = {}, 0, 0.0
     for row in rows:
         steps, seconds = int(row["agent_steps"]), float(row["wall_s"])
-        for name, tag in tensorboard.TAGS.items():
-            if row[name]:
-                curves.setdefault(tag, []).append((steps, float(np.float32(row[name]))))
+        for metric in metrics.METRICS:
+            if metric.tag and row[metric.name]:
+                point = steps, float(np.float32(row[metric.name]))
+                curves.setdefault(metric.tag, []).append(point)
         if seconds > last_seconds:
             rate = np.float32((steps - last_steps) / (seconds - last_seconds))
             curves.setdefault("time/steps_per_s", []).append((steps, float(rate)))
@@ -67,18 +75,19 @@ def expected(folder):
 
 
 def row(steps, **values):
-    cells = dict.fromkeys(metrics.COLUMNS)
+    cells = dict.fromkeys(metrics.columns())
     return cells | {"agent_steps": steps, "wall_s": steps / 100} | values
 
 
 def test_every_column_is_a_curve():
-    assert {"agent_steps", *tensorboard.TAGS} == set(metrics.COLUMNS)
-    assert len({*tensorboard.TAGS.values(), tensorboard.RATE}) == len(tensorboard.TAGS) + 1
-    assert all(tag.count("/") == 1 for tag in tensorboard.TAGS.values())
+    tags = {metric.name: metric.tag for metric in metrics.METRICS}
+    assert tags.pop("agent_steps") is None  # which every curve is drawn against
+    assert len({*tags.values(), tensorboard.RATE}) == len(tags) + 1
+    assert all(tag.count("/") == 1 for tag in tags.values())
 
 
 def test_points_are_those_of_the_rows(tmp_path):
-    file = metrics.MetricsFile(tmp_path, 0)
+    file = metrics_file.MetricsFile(tmp_path, 0)
     events = tensorboard.EventFile(tmp_path, CONFIG, file.kept)
     rows = [row(100, entropy=1 / 3), row(200, episode_return=1e-9, value_loss=float("inf"))]
     for each in [*rows, row(300, entropy=float("nan"))]:
@@ -95,27 +104,28 @@ def test_points_are_those_of_the_rows(tmp_path):
 
 def test_hyperparameters_are_all_of_the_run(tmp_path):
     tensorboard.EventFile(tmp_path, CONFIG, [])
-    version, start, experiment, session = records(tmp_path)
+    version, start, _, session = records(tmp_path)
     assert version.file_version == "brain.Event:2"
     assert (start.session_log.status, start.step) == (SessionLog.START, 0)
     (value,) = session.summary.value
     data = HParamsPluginData.FromString(value.metadata.plugin_data.content)
     shown = data.session_start_info.hparams
-    assert set(shown) == {"preset", "seed", "spacecraft", *vars(CONFIG.settings)}
+    assert set(shown) == {"preset", "seed", "spacecraft", *CONFIG.settings.flat}
     assert shown["spacecraft"].string_value == "LM50"
     assert shown["preset"].string_value == CONFIG.preset
-    assert shown["clip"].number_value == CONFIG.settings.clip
-    assert shown["frameskips"].string_value == ",".join(map(str, CONFIG.settings.frameskips))
-    assert shown["stagger_episodes"].bool_value is CONFIG.settings.stagger_episodes
-    (value,) = experiment.summary.value
-    data = HParamsPluginData.FromString(value.metadata.plugin_data.content)
-    assert {m.name.tag for m in data.experiment.metric_infos} <= set(tensorboard.TAGS.values())
+    assert shown["clip"].number_value == CONFIG.settings.ppo.clip
+    assert shown["frameskips"].string_value == ",".join(map(str, CONFIG.settings.task.frameskips))
+    assert shown["stagger_episodes"].bool_value is CONFIG.settings.task.stagger_episodes
+    assert compared(tmp_path) == [
+        "episode/return", "episode/success_rate", "episode/overspeed_rate",
+        "episode/terminal_error_deg",
+    ]  # fmt: skip
 
 
 def test_a_start_writes_the_kept_rows_anew(tmp_path):
     """Whatever stood there: rows after the checkpoint, half a record, half a file."""
     for steps_kept in (300, 200, 0):
-        file = metrics.MetricsFile(tmp_path, steps_kept)
+        file = metrics_file.MetricsFile(tmp_path, steps_kept)
         events = tensorboard.EventFile(tmp_path, CONFIG, file.kept)
         assert points(tmp_path) == expected(tmp_path)
         done = int(file.kept[-1]["agent_steps"]) if file.kept else 0
@@ -129,10 +139,10 @@ def test_a_start_writes_the_kept_rows_anew(tmp_path):
 
 
 def test_the_clock_leaves_the_pauses_out(tmp_path):
-    file = metrics.MetricsFile(tmp_path, 0)
+    file = metrics_file.MetricsFile(tmp_path, 0)
     for steps in (100, 200):
         file.append(row(steps, entropy=1.0))
-    kept = metrics.MetricsFile(tmp_path, 200).kept
+    kept = metrics_file.MetricsFile(tmp_path, 200).kept
     tensorboard.EventFile(tmp_path, CONFIG, kept).append(row(300, entropy=1.0))
     times = [e.wall_time for e in records(tmp_path) if e.step]
     np.testing.assert_allclose(np.diff(times), 1.0, atol=1e-6)

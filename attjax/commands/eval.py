@@ -1,0 +1,210 @@
+"""Judge an attitude controller over random slews, as in the paper's Table 2."""
+
+import argparse
+import contextlib
+import dataclasses
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from attjax import cli, config_file, destinations, devices, errors, run_folder
+from attjax.commands import evaluation_output
+from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
+
+POLICY = "policy"
+STDOUT = Path("-")
+CLASSICAL = ("phase-plane", "feedback")
+USAGE = "%(prog)s [--checkpoint FOLDER | --controller NAME] [--compare] [FLAG ...]"
+EXAMPLES = """\
+examples:
+  python eval.py --checkpoint ckpt/                 5,000 random slews
+  python eval.py --checkpoint ckpt/ --frameskip 20  the same at 11.43 Hz
+  python eval.py --checkpoint ckpt/ --compare       beside the classical ones
+  python eval.py --checkpoint ckpt/ --json result.json --plot figures/
+  python eval.py --checkpoint ckpt/ --json - | python -m json.tool
+  python eval.py --checkpoint ckpt/ --playback slews.html
+  python eval.py --controller phase-plane           needs no checkpoint
+"""
+
+
+def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    """The command line."""
+    parser = cli.Parser(usage=USAGE, description=__doc__, epilog=cli.examples(EXAMPLES))
+    _add_who(parser.add_argument_group("what to evaluate"))
+    _add_conditions(parser.add_argument_group("conditions, the same for all controllers"))
+    _add_output(parser.add_argument_group("output"))
+    return parser.parse_args(argv)
+
+
+def _add_who(group):
+    cli.add_checkpoint(group)
+    cli.add_best(group)
+    who = group.add_mutually_exclusive_group()
+    controller_help = "the trained policy (default), or a classical controller, without checkpoint"
+    who.add_argument(
+        "--controller", choices=(POLICY, *CLASSICAL), default=POLICY, help=controller_help
+    )
+    compare_help = "policy, classical controllers and the paper side by side, on the same slews"
+    who.add_argument("--compare", action="store_true", help=compare_help)
+
+
+def _add_conditions(group):
+    cli.add_number(group, "episodes", int, 5000, "number of random slews", low=1, high=10**7)
+    cli.add_frameskip(
+        group, "RK4 steps of 1/240 s after the first of a decision, for 240/(N + 1) Hz"
+    )
+    craft_help = (
+        "TOML file of the spacecraft that flies (default: the one that the policy was trained on; "
+        "LM50 for a classical controller)"
+    )
+    group.add_argument("--spacecraft", type=cli.path, metavar="FILE", help=craft_help)
+    duration_help = "length of an episode (default: the spacecraft's; LM50's is 43.75)"
+    limits = {"above": 0, "high": MOST_DURATION}
+    cli.add_number(group, "duration", float, None, duration_help, unit="s", **limits)
+    cli.add_seed_and_device(group, "seed of the initial slews")
+
+
+def _add_output(group):
+    json_help = "also write the statistics here; -: to stdout, and the report to stderr"
+    group.add_argument("--json", type=cli.path, metavar="FILE", help=json_help)
+    plot_help = "also draw figures into this folder (needs the extra plot)"
+    group.add_argument("--plot", type=cli.path, metavar="FOLDER", help=plot_help)
+    playback_help = (
+        "also write a web page that replays slews in 3-D: the controller beside phase-plane, or "
+        "phase-plane beside feedback"
+    )
+    group.add_argument("--playback", type=cli.path, metavar="FILE", help=playback_help)
+
+
+@errors.program("eval.py")
+def main(argv: Sequence[str] | None = None) -> int:
+    """Evaluate a checkpoint or a classical controller; returns the exit status."""
+    arguments = parse_arguments(argv)
+    advice = "fewer --episodes take less"
+    with errors.one_line_errors(), errors.enough_memory(advice):
+        devices.select_device(arguments.device)
+        names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
+        trained = _trained(arguments, names)
+        arguments.frameskip = cli.frameskip(arguments.frameskip, trained)
+        spacecraft = _spacecraft(arguments, names)
+        controllers = {name: _controller(name, arguments, spacecraft) for name in names}
+        if arguments.json not in (None, STDOUT):
+            destinations.check("--json", arguments.json)
+        evaluation_output.prepare_playback(
+            arguments.playback, spacecraft.max_steps(arguments.frameskip)
+        )
+        plots = evaluation_output.prepare_plots(arguments.plot)
+        is_drawn = plots is not None and POLICY in controllers
+        metrics = evaluation_output.metrics_rows(arguments.checkpoint) if is_drawn else []
+        json_file, aside = arguments.json, contextlib.nullcontext()
+        if json_file == STDOUT:
+            json_file, aside = sys.stdout, contextlib.redirect_stdout(sys.stderr)
+        cli.warn_of_untrained(arguments.frameskip, trained)
+        with aside:
+            return _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file)
+
+
+def _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file):
+    """Fly, draw, write and print."""
+    # Imported late: with them, --help and errors in the arguments would take seconds.
+    import jax
+
+    from attjax import evaluation, report
+    from attjax.env import AttitudeEnv
+
+    env = AttitudeEnv(arguments.frameskip, spacecraft=spacecraft)
+    params = env.default_params
+    start = time.monotonic()
+    seed, results, written = arguments.seed or 0, [], []
+    conditions = evaluation.conditions(env, params, seed, arguments.episodes)
+    for name, controller in controllers.items():
+        flown = evaluation.fly(controller, env, params, jax.random.key(seed), arguments.episodes)
+        statistics = evaluation.statistics(flown, env, params)
+        results.append({"controller": name} | conditions | statistics)
+        if plots:
+            folder = arguments.plot / name if arguments.compare else arguments.plot
+            flight = plots.Flight(controller, env, params, seed, flown)
+            written += plots.write_all(flight, folder, metrics if name == POLICY else [])
+    seconds = time.monotonic() - start
+    try:
+        if json_file:
+            evaluation_output.write_json(
+                json_file, {"controllers": results} if arguments.compare else results[0]
+            )
+        if arguments.playback:
+            _write_playback(arguments, controllers, env, params)
+            written.append(arguments.playback)
+    finally:  # where one of them fails, too
+        for path in written:
+            print(f"wrote {path}")
+        if arguments.compare:
+            report.print_comparison(results, spacecraft)
+        else:
+            report.print_report(results[0], spacecraft)
+        print(f"evaluated in {seconds:.1f} s, compilation included")
+    return 0
+
+
+def _write_playback(arguments, controllers, env, params):
+    """The controller that is judged beside phase-plane, or that beside feedback."""
+    from attjax import playback
+
+    name = next(iter(controllers))
+    other = "feedback" if name == "phase-plane" else "phase-plane"
+    shown = {name: controllers[name], other: _controller(other, arguments, env.spacecraft)}
+    checkpoint = arguments.checkpoint.resolve().name if name == POLICY else None
+    page = playback.page(shown, env, params, arguments.seed or 0, checkpoint)
+    evaluation_output.write_text(arguments.playback, page)
+
+
+def _trained(arguments, names):
+    """The frameskips that the policy was trained at; None where there is no policy."""
+    if arguments.frameskip is not None:
+        _check_duration(arguments.duration, arguments.frameskip)
+    if POLICY in names:
+        return run_folder.read_config(arguments.checkpoint).settings.task.frameskips
+    return None
+
+
+def _spacecraft(arguments, names):
+    """What flies, with the duration that was asked for."""
+    if arguments.spacecraft is not None:
+        spacecraft = config_file.read_spacecraft(arguments.spacecraft)
+    elif POLICY in names:
+        spacecraft = run_folder.read_config(arguments.checkpoint).spacecraft
+    else:
+        spacecraft = LM50
+    if arguments.duration is not None:
+        try:
+            spacecraft = dataclasses.replace(spacecraft, duration=arguments.duration)
+        except ValueError as error:
+            raise errors.UserError(f"--duration {arguments.duration:g}: {error}") from None
+    _check_duration(spacecraft.duration, arguments.frameskip)
+    return spacecraft
+
+
+def _check_duration(duration, frameskip):
+    period = (frameskip + 1) * INTEGRATION_STEP
+    if duration is not None and duration < period * (1 - 1e-6):
+        raise errors.UserError(
+            f"--duration is {duration} s; it must hold at least one agent step of {period:.4g} s"
+        )
+
+
+def _controller(name, arguments, spacecraft):
+    import jax
+
+    from attjax import checkpoint, controllers
+
+    if name != POLICY:
+        return jax.tree_util.Partial(controllers.CONTROLLERS[name])
+    folder = arguments.checkpoint
+    update = checkpoint.best(folder) if arguments.best else None
+    trained_on = run_folder.read_config(folder).spacecraft
+    if trained_on.num_actions != spacecraft.num_actions:
+        raise errors.UserError(
+            f"{arguments.spacecraft} has {spacecraft.num_actions} actions; the policy in {folder} "
+            f"chooses among {trained_on.num_actions}"
+        )
+    return checkpoint.restore_policy(folder, update)

@@ -1,0 +1,80 @@
+"""The files that an evaluation writes: tried before the work, written after it."""
+
+import json
+import os
+from pathlib import Path
+from types import ModuleType
+from typing import TextIO
+
+from attjax import destinations, errors, run_folder
+
+
+def prepare_plots(folder: Path | None) -> ModuleType | None:
+    """The module that draws, with its folder made; None where no plots were asked for.
+
+    Raises:
+        UserError: matplotlib cannot be imported, or the folder cannot be written.
+    """
+    if folder is None:
+        return None
+    os.environ["MPLBACKEND"] = "agg"  # one of a notebook or of another matplotlib fails its import
+    try:
+        from attjax import plots
+    except ImportError:
+        raise errors.UserError("--plot needs matplotlib: pip install 'attjax[plot]'") from None
+    except ValueError as error:
+        raise errors.UserError(
+            f"--plot: matplotlib cannot read its matplotlibrc: {error}"
+        ) from None
+    destinations.check_folder("--plot", folder)
+    return plots
+
+
+def prepare_playback(path: Path | None, steps: int) -> None:
+    """See that a page of so many agent steps can be made, and written.
+
+    Raises:
+        UserError: it cannot.
+    """
+    if path is None:
+        return
+    from attjax import playback
+
+    if steps > playback.MAX_STEPS:
+        raise errors.UserError(
+            f"--playback shows slews of at most {playback.MAX_STEPS:,} agent steps, and these "
+            f"have {steps:,}: give a shorter --duration or a larger --frameskip"
+        )
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise errors.UserError(f"--playback {path} cannot be written: it is no ordinary file")
+    destinations.check("--playback", path)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file.
+
+    Raises:
+        FolderError: it cannot be written.
+    """
+    with run_folder.writing(path):
+        destinations.write(path, text)
+
+
+def write_json(file: Path | TextIO, content: dict) -> None:
+    """Write JSON into a path, or to a stream.
+
+    Raises:
+        FolderError: the path cannot be written.
+    """
+    text = json.dumps(content, indent=2) + "\n"
+    if isinstance(file, Path):
+        write_text(file, text)
+    else:
+        print(text, end="", file=file, flush=True)
+
+
+def metrics_rows(folder: Path) -> list[dict]:
+    """The rows of a run's metrics.csv, for the learning curve."""
+    from attjax import metrics
+
+    return metrics.read_rows(folder / run_folder.METRICS)

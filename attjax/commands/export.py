@@ -1,0 +1,129 @@
+"""Write a trained attitude controller for flight software: C99, ONNX or StableHLO."""
+
+import argparse
+import contextlib
+import importlib
+from collections.abc import Sequence
+
+from attjax import c_names, cli, destinations, devices, errors, run_folder
+
+FORMATS = {"c": "export_c", "onnx": "export_onnx", "stablehlo": "export_stablehlo"}
+NEEDED = {"export_onnx": "onnx", "export_stablehlo": "flatbuffers"}
+USAGE = "%(prog)s --format FORMAT --out FOLDER [--checkpoint FOLDER] [FLAG ...]"
+EXAMPLES = """\
+examples:
+  python export.py --checkpoint pretrained/precise --format c --out flight/
+  python export.py --checkpoint ckpt/ --best --format onnx --out flight/
+"""
+
+
+def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    """The command line."""
+    parser = cli.Parser(usage=USAGE, description=__doc__, epilog=cli.examples(EXAMPLES))
+    _add_what(parser.add_argument_group("what to export"))
+    _add_output(parser.add_argument_group("output"))
+    return parser.parse_args(argv)
+
+
+def _add_what(group):
+    cli.add_checkpoint(group)
+    cli.add_best(group)
+    cli.add_frameskip(group, "control rate of the flight software, 240/(N + 1) Hz")
+    cli.add_seed_and_device(group, "seed of the slews that test vectors come from")
+
+
+def _add_output(group):
+    format_help = "c: C99 and C++, with a test program; onnx and stablehlo need the extra onnx"
+    group.add_argument("--format", choices=FORMATS, required=True, help=format_help)
+    out_help = "folder to write into"
+    group.add_argument("--out", type=cli.path, metavar="FOLDER", required=True, help=out_help)
+    prefix_help = (
+        "what the names of the files begin with, and in C those of functions and macros: for two "
+        f"rates in one program (default: {c_names.PREFIX})"
+    )
+    group.add_argument(
+        "--prefix", type=_prefix, metavar="NAME", default=c_names.PREFIX, help=prefix_help
+    )
+    overwrite_help = "replace files that an export wrote before"
+    group.add_argument("--overwrite", action="store_true", help=overwrite_help)
+
+
+def _prefix(text):
+    try:
+        return c_names.check(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+@errors.program("export.py")
+def main(argv: Sequence[str] | None = None) -> int:
+    """Export a checkpoint; returns the exit status."""
+    arguments = parse_arguments(argv)
+    with errors.one_line_errors():
+        devices.select_device(arguments.device)
+        module = _module(FORMATS[arguments.format])
+        flight = _flight_policy(arguments)
+        names = [c_names.renamed(name, arguments.prefix) for name in module.FILES]
+        _prepare(arguments.out, names, arguments.overwrite)
+        cli.warn_of_untrained(flight.env.frameskip, flight.origin.frameskips)
+        with _exporting(arguments.checkpoint):
+            contents = module.files(flight, arguments.seed or 0, arguments.prefix)
+        with run_folder.writing(arguments.out):
+            for name, content in contents.items():
+                destinations.write(arguments.out / name, content)
+        for name in contents:
+            print(f"wrote {arguments.out / name}")
+    return 0
+
+
+def _module(name):
+    try:
+        return importlib.import_module("attjax." + name)
+    except ModuleNotFoundError as error:
+        if error.name != NEEDED.get(name):
+            raise
+        needed = f"--format needs {error.name}: pip install 'attjax[onnx]'"
+        raise errors.UserError(needed) from None
+
+
+def _flight_policy(arguments):
+    # Imported late: with them, --help and errors in the arguments would take seconds.
+    from attjax import checkpoint, provenance
+    from attjax.env import AttitudeEnv
+    from attjax.flight_policy import FlightPolicy
+
+    folder = arguments.checkpoint
+    config = run_folder.read_config(folder)
+    newest = checkpoint.latest(folder)
+    update = checkpoint.best(folder) if arguments.best else newest
+    policy, params = checkpoint.restore_network(folder, update)
+    if callable(policy.features) and arguments.format != "stablehlo":
+        raise errors.UserError(
+            f"the policy in {folder} sees {config.settings.network.features}, which --format "
+            f"{arguments.format} does not know; stablehlo does"
+        )
+    frameskip = cli.frameskip(arguments.frameskip, config.settings.task.frameskips)
+    with _exporting(folder):
+        env = AttitudeEnv(frameskip, spacecraft=config.spacecraft)
+        return FlightPolicy(policy, params, env, provenance.of_run(config, update, newest))
+
+
+@contextlib.contextmanager
+def _exporting(folder):
+    try:
+        yield
+    except ValueError as error:
+        raise errors.UserError(f"{folder} cannot be exported: {error}") from None
+
+
+def _prepare(folder, names, overwrite):
+    """Make the folder and see that it can be written to.
+
+    Files of other names are left alone; those of an export only give way to ``overwrite``.
+    """
+    destinations.check_folder("--out", folder)
+    present = [name for name in names if (folder / name).exists()]
+    if present and not overwrite:
+        raise errors.UserError(
+            f"{folder} holds {present[0]} already: pass --overwrite to replace it, or another --out"
+        )

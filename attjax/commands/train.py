@@ -1,0 +1,157 @@
+"""Train a neural attitude controller by PPO, in a vectorised simulator."""
+
+import argparse
+import dataclasses
+import importlib
+from collections.abc import Sequence
+
+from attjax import cli, config_file, devices, errors, fields, presets, run_folder, signals
+from attjax.specification import LM50
+
+DEFAULT_PRESET = "precise"
+USAGE = "%(prog)s [--preset NAME] [--checkpoint FOLDER] [--resume] [FLAG ...]"
+EXAMPLES = """\
+An agent step is an impulse and the free rotation after it. Symbols, equations
+and tables are the paper's; λ is that of generalised advantage estimation.
+
+examples:
+  python train.py                             the default preset, into ckpt/
+  python train.py --resume                    after Ctrl-C or a crash
+  python train.py --preset paper-fast --checkpoint runs/fast
+  python train.py --hidden-sizes 128,128 --seed 1 --checkpoint runs/wide
+  python train.py --preset paper --print-config > run.toml
+  python train.py --config run.toml --checkpoint runs/paper
+  python train.py --spacecraft mine.toml --checkpoint runs/mine
+"""
+
+
+def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    """The command line."""
+    parser = cli.Parser(usage=USAGE, description=__doc__, epilog=cli.examples(EXAMPLES))
+    groups = {name: parser.add_argument_group(title) for name, title in fields.GROUPS.items()}
+    preset_help = f"the recipe; flags override it (default: {DEFAULT_PRESET})"
+    groups["run"].add_argument("--preset", choices=presets.PRESETS, help=preset_help)
+    craft_help = "TOML file that describes the spacecraft and its task (default: LM50, the paper's)"
+    groups["task"].add_argument("--spacecraft", type=cli.path, metavar="FILE", help=craft_help)
+    for name, group in groups.items():
+        cli.add_settings(group, name)
+    _add_run(groups["run"])
+    _add_logging(groups["logging"])
+    return parser.parse_args(argv)
+
+
+def _add_run(group):
+    cli.add_checkpoint(group)
+    existing = group.add_mutually_exclusive_group()
+    resume_help = "continue the folder's run, or start it if there is none"
+    existing.add_argument("--resume", action="store_true", help=resume_help)
+    existing.add_argument("--overwrite", action="store_true", help="replace the folder's run")
+    cli.add_seed_and_device(group, "seed of everything random")
+    config_help = "TOML file with preset, seed, [settings] and [spacecraft]; flags override it"
+    group.add_argument("--config", type=cli.path, metavar="FILE", help=config_help)
+    print_help = "print the file that reproduces this run, and end"
+    group.add_argument("--print-config", action="store_true", help=print_help)
+
+
+def _add_logging(group):
+    save_help = "time between two checkpoints"
+    cli.add_number(group, "save-every", float, 30.0, save_help, unit="s", low=0)
+    tensorboard_help = "also write TensorBoard's event files, into FOLDER/tensorboard"
+    group.add_argument("--tensorboard", action="store_true", help=tensorboard_help)
+    debug_help = "check every operation, and name the first that makes a NaN (slow)"
+    group.add_argument("--debug-nans", action="store_true", help=debug_help)
+
+
+@errors.program("train.py")
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a training; returns the exit status."""
+    arguments = parse_arguments(argv)
+    with errors.one_line_errors(ValueError):
+        given = _given(arguments)
+        new = _new_config(**given)
+    if arguments.print_config:
+        print(config_file.text(new), end="")
+        return 0
+    with signals.StopSignals() as stop, errors.one_line_errors():
+        if arguments.tensorboard:
+            _check_tensorboard()
+        device = devices.select_device(arguments.device)
+        advice = "fewer --num-envs or a shorter --rollout-length take less"
+        with run_folder.opened(arguments.checkpoint), errors.enough_memory(advice):
+            run = _open(arguments, given, new, stop)
+            if arguments.tensorboard:
+                run.write_events()
+            run.describe(device)
+            return run.train(arguments.save_every, arguments.debug_nans)
+
+
+def _check_tensorboard():
+    """Fail before anything is written."""
+    try:
+        importlib.import_module("tensorboardX")
+    except ImportError:
+        needed = "--tensorboard needs tensorboardX: pip install 'attjax[tensorboard]'"
+        raise errors.UserError(needed) from None
+
+
+def _given(arguments):
+    """By name, what the command line says of the run, and the file where it says nothing."""
+    given = {} if arguments.config is None else config_file.read(arguments.config)
+    for name in ("preset", "seed"):
+        if getattr(arguments, name) is not None:
+            given[name] = getattr(arguments, name)
+    if arguments.spacecraft is not None:
+        given["spacecraft"] = config_file.read_spacecraft(arguments.spacecraft)
+    return given | cli.overrides(arguments)
+
+
+def _new_config(preset=DEFAULT_PRESET, seed=0, spacecraft=LM50, **settings):
+    return run_folder.Config(preset, seed, presets.PRESETS[preset].replace(**settings), spacecraft)
+
+
+def _open(arguments, given, new, stop):
+    """The folder's run, new or continued."""
+    # Imported late: with it, --help and errors in the arguments would take seconds.
+    from attjax import training
+
+    folder = arguments.checkpoint
+    resumes = arguments.resume and run_folder.holds_run(folder)
+    if not resumes:
+        # Before a run gives way to this one: it fails where a user's function cannot be used.
+        setup = _setup(new)
+        run_folder.create(folder, new, arguments.overwrite)
+        run = training.Run(folder, new, setup, stop)
+    else:
+        old = run_folder.read_config(folder)
+        longer = _resumed_config(given, old)
+        run = training.Run(folder, longer, _setup(longer), stop)
+        if longer != old:
+            run.announce_longer(old.settings)
+            run_folder.write_config(folder, longer)
+    return run
+
+
+def _setup(config):
+    from attjax import assembly
+
+    num_devices = assembly.num_devices(config.settings)
+    try:
+        return assembly.setup(config.settings, config.spacecraft, num_devices)
+    except ValueError as error:
+        raise errors.UserError(error) from None
+
+
+def _resumed_config(given, config):
+    """What the folder's run was started with, with a larger total if one was asked for."""
+    total = given.get("total_steps", config.settings.ppo.total_steps)
+    run = vars(config) | config.settings.flat | {"total_steps": total}
+    differing = [name for name, value in given.items() if run[name] != value]
+    if differing:
+        listed = ", ".join(f"{name} ({run[name]})" for name in differing)
+        raise errors.UserError(f"--resume keeps the run's settings; leave out {listed}")
+    if total < config.settings.ppo.total_steps:
+        raise errors.UserError(
+            f"--total-steps is {total}; to resume, it must be at least the run's "
+            f"{config.settings.ppo.total_steps}"
+        )
+    return dataclasses.replace(config, settings=config.settings.replace(total_steps=total))

@@ -1,0 +1,144 @@
+"""The equations of motion of a rigid body: Euler's (Eq. 6) and the quaternion kinematics (Eq. 9).
+
+They are written for scalars, one a component, in named tuples: JAX takes these for trees, so that
+nothing but the compiled loop knows in which order the components stand. What else accelerates the
+spacecraft is one more term in :meth:`EquationsOfMotion.rate`, and what else changes with time one
+more component of the state.
+"""
+
+import operator
+from typing import NamedTuple, TypeVar
+
+import chex
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from attjax import quaternion as quaternions
+from attjax import rigid_body
+
+Tree = TypeVar("Tree")
+Vector = tuple[chex.Array, chex.Array, chex.Array]
+Products = tuple[chex.Array, chex.Array, chex.Array, chex.Array, chex.Array, chex.Array]
+
+PRODUCTS = ((1, 2), (2, 0), (0, 1), (0, 0), (1, 1), (2, 2))
+"""The products ωⱼ ωₖ of which the gyroscopic acceleration of a full tensor is made."""
+
+_LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)).transpose(2, 0, 1)
+
+
+class RigidState(NamedTuple):
+    """Attitude and rate by components; also their change, and their rate of change.
+
+    Attributes:
+        quaternion: four scalars, scalar part last.
+        angular_velocity: three scalars, body frame, rad/s.
+    """
+
+    quaternion: tuple[chex.Array, chex.Array, chex.Array, chex.Array]
+    angular_velocity: Vector
+
+    @classmethod
+    def of(cls, quaternion: chex.Array, angular_velocity: chex.Array) -> "RigidState":
+        """The components of a (4,) quaternion and a (3,) angular velocity, rad/s."""
+        return cls(quaternion=tuple(quaternion), angular_velocity=tuple(angular_velocity))
+
+    def vectors(self) -> tuple[chex.Array, chex.Array]:
+        """The quaternion (4,) and the angular velocity (3,), rad/s."""
+        return jnp.stack(self.quaternion), jnp.stack(self.angular_velocity)
+
+
+class PrincipalTerms(NamedTuple):
+    """Gyroscopic terms of a body in its principal axes.
+
+    Attributes:
+        factors: (Iⱼ − Iₖ)/Iᵢ of each axis i, the factor of ωⱼ ωₖ.
+    """
+
+    factors: Vector
+
+    @classmethod
+    def of(cls, moments: chex.Array) -> "PrincipalTerms":
+        """The terms of (3,) principal moments, kg m²."""
+        i1, i2, i3 = moments
+        return cls(factors=((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3))
+
+    def acceleration(self, angular_velocity: Vector) -> Vector:
+        """−I⁻¹ (ω × Iω), rad/s², of ω in rad/s."""
+        w1, w2, w3 = angular_velocity
+        a, b, c = self.factors
+        return a * (w2 * w3), b * (w3 * w1), c * (w1 * w2)
+
+
+class TensorTerms(NamedTuple):
+    """Gyroscopic terms of a body in any axes.
+
+    Attributes:
+        first, second, third: of this axis, the factors of all the products in PRODUCTS.
+    """
+
+    first: Products
+    second: Products
+    third: Products
+
+    @classmethod
+    def of(cls, inertia: chex.Array, inverse: chex.Array) -> "TensorTerms":
+        """The terms of a (3, 3) inertia, kg m², and its inverse."""
+        cross = jnp.array(_LEVI_CIVITA, inertia.dtype)
+        factors = -jnp.einsum("il,ljm,mk->ijk", inverse, cross, inertia, precision="highest")
+        factors = factors + factors.swapaxes(1, 2)
+        first, second, third = (
+            tuple(axis[j, k] / (2 if j == k else 1) for j, k in PRODUCTS) for axis in factors
+        )
+        return cls(first=first, second=second, third=third)
+
+    def acceleration(self, angular_velocity: Vector) -> Vector:
+        """−I⁻¹ (ω × Iω), rad/s², of ω in rad/s."""
+        products = [angular_velocity[j] * angular_velocity[k] for j, k in PRODUCTS]
+
+        def along(factors):
+            return sum(factor * product for factor, product in zip(factors, products))
+
+        return along(self.first), along(self.second), along(self.third)
+
+
+class EquationsOfMotion(NamedTuple):
+    """Eq. 6, solved for ω̇, and Eq. 9, with all that stays the same over an RK4 step.
+
+    Attributes:
+        torque: I⁻¹ M of the commanded torque, rad/s²; None while none is on.
+        gyroscopic: the terms of −I⁻¹ (ω × Iω).
+    """
+
+    torque: Vector | None
+    gyroscopic: PrincipalTerms | TensorTerms
+
+    @classmethod
+    def of(cls, inertia: chex.Array, torque: chex.Array) -> "EquationsOfMotion":
+        """The equations of an inertia (3,) or (3, 3), kg m², under a torque (3,), N m."""
+        if inertia.ndim == 1:
+            principal = PrincipalTerms.of(inertia)
+            return cls(torque=tuple(torque / inertia), gyroscopic=principal)
+        inverse = rigid_body.inverse(inertia)
+        tensor = TensorTerms.of(inertia, inverse)
+        acceleration = jnp.matmul(inverse, torque, precision="highest")
+        return cls(torque=tuple(acceleration), gyroscopic=tensor)
+
+    def coasting(self) -> "EquationsOfMotion":
+        """The same with the commanded torque off."""
+        return self._replace(torque=None)
+
+    def rate(self, state: RigidState) -> RigidState:
+        """Rate of change of the state."""
+        acceleration = self.gyroscopic.acceleration(state.angular_velocity)
+        if self.torque is not None:
+            acceleration = add(acceleration, self.torque)
+        return RigidState(
+            quaternion=quaternions.derivative(state.quaternion, state.angular_velocity),
+            angular_velocity=acceleration,
+        )
+
+
+def add(tree: Tree, other: Tree) -> Tree:
+    """The sum of two trees of the same structure, leaf by leaf."""
+    return jax.tree.map(operator.add, tree, other)

@@ -1,0 +1,36 @@
+"""How compiled programs share their work out to devices, or to CPU cores as devices."""
+
+from collections.abc import Callable
+
+import jax
+import numpy as np
+from jax.sharding import Mesh, PartitionSpec
+
+AXIS = "devices"
+SHARED, SPLIT = PartitionSpec(), PartitionSpec(AXIS)
+"""What is the same on all devices, and what is split along its first axis."""
+
+COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512}
+"""For outermost jitted functions only: JAX refuses options on a function called in another."""
+
+
+def mesh(num_devices: int) -> Mesh:
+    """The first devices of JAX's default platform, as one axis."""
+    return Mesh(np.array(jax.devices()[:num_devices]), (AXIS,))
+
+
+def on_devices(num_devices: int, function: Callable, in_specs, out_specs) -> Callable:
+    """``function`` on each device's part of its arguments, with the axis AXIS.
+
+    Args:
+        num_devices: the first so many of JAX's default platform.
+        function: of arrays or pytrees of them.
+        in_specs, out_specs: SHARED, SPLIT or pytrees of such, of its arguments and results.
+    """
+    return jax.shard_map(
+        function,
+        mesh=mesh(num_devices),
+        in_specs=in_specs,
+        out_specs=out_specs,
+        check_vma=False,
+    )

@@ -1,0 +1,95 @@
+"""Importing the library changes nothing of the process that others rely on."""
+
+import logging
+import sys
+
+import pytest
+from commands import python
+
+from attjax import quiet
+
+FRESH = """
+import ast, codecs, importlib, logging, os, pkgutil, signal, warnings
+from pathlib import Path
+import attjax
+
+names = [m.name for m in pkgutil.walk_packages(attjax.__path__, "attjax.")]
+names = [name for name in names if not name.endswith("__main__")]
+
+def others(name):
+    "What a module imports at its top, of others: their own side effects are not ours."
+    for node in ast.parse(Path(importlib.util.find_spec(name).origin).read_text()).body:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+
+def tried(name):
+    try:
+        importlib.import_module(name)
+    except ImportError as error:
+        return error.name
+
+for other in sorted({other for name in names for other in others(name)} | {"matplotlib"}):
+    if not other.startswith("attjax"):
+        tried(other)
+
+import jax
+import matplotlib
+from jax._src import xla_bridge
+
+def state():
+    loggers = {"": logging.getLogger(), **logging.root.manager.loggerDict}
+    levels = {name: getattr(logger, "level", 0) for name, logger in loggers.items()}
+    return {
+        "levels": {name: level for name, level in levels.items() if level},
+        "disabled": logging.root.manager.disable,
+        "filters": list(warnings.filters),
+        "showwarning": warnings.showwarning,
+        "hooks": (sys.unraisablehook, sys.excepthook, sys.displayhook, sys.stdout, sys.stderr),
+        "path": list(sys.path),
+        "environment": dict(os.environ),
+        "folder": os.getcwd(),
+        "signals": {number: signal.getsignal(number) for number in signal.valid_signals()},
+        "matplotlib": dict(matplotlib.rcParams),
+        "jax": dict(jax.config.values),
+        "devices": xla_bridge.backends_are_initialized(),
+    }
+
+before = state()
+absent = {name: tried(name) for name in names}
+after = state()
+for what in before:
+    assert before[what] == after[what], (what, before[what], after[what])
+ours = {name for name, missing in absent.items() if missing and missing.startswith("attjax")}
+assert not ours and sum(missing is None for missing in absent.values()) > 40, absent
+try:
+    codecs.lookup_error("attjax.plain")
+except LookupError:
+    print("unchanged")
+"""
+
+
+def test_importing_every_module_changes_nothing_of_the_process():
+    done = python(FRESH)
+    assert done.stdout == "unchanged\n" and done.stderr == "", done.stderr
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_orbax_is_kept_quiet_no_longer_than_it_works(fails, monkeypatch):
+    def hook(_):
+        raise AssertionError
+
+    monkeypatch.setattr(sys, "unraisablehook", hook)
+    loggers = [logging.getLogger(name) for name in quiet.LOGGERS]
+    for logger in loggers:
+        monkeypatch.setattr(logger, "level", logging.INFO)
+    try:
+        with quiet.orbax():
+            assert sys.unraisablehook is not hook
+            assert {logger.level for logger in loggers} == {logging.CRITICAL}
+            assert not fails, "as Orbax may"
+    except AssertionError as error:
+        assert fails and str(error).startswith("as Orbax may")
+    assert sys.unraisablehook is hook
+    assert {logger.level for logger in loggers} == {logging.INFO}

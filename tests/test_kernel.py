@@ -1,0 +1,43 @@
+"""The one loop over a batch, apart from the physics that it is for."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from attjax.kernel import one_loop
+
+
+class Body(NamedTuple):
+    place: tuple
+    speed: jax.Array
+    push: jax.Array | None
+
+
+def step(body, wind):
+    speed = body.speed + wind["x"]
+    return {"body": Body(tuple(x + speed for x in body.place), speed, body.push), "sum": speed * 2}
+
+
+def test_trees_go_in_and_come_out():
+    """Structure, names and what is absent: as from the function itself."""
+    body = Body((jnp.arange(5.0), jnp.ones(5)), jnp.linspace(-1, 1, 5), None)
+    wind = {"x": jnp.full(5, 0.25)}
+    ours = jax.jit(jax.vmap(lambda *trees: one_loop(step, *trees)))(body, wind)
+    expected = jax.vmap(step)(body, wind)
+    assert jax.tree.structure(ours) == jax.tree.structure(expected)
+    jax.tree.map(np.testing.assert_array_equal, ours, expected)
+
+
+def test_whatever_the_trees_there_is_one_reduction():
+    body = Body((1.0, 2.0), 3.0, None)
+    jaxpr = jax.make_jaxpr(lambda *trees: one_loop(step, *trees))(body, {"x": 0.5}).jaxpr
+    reductions = [equation for equation in jaxpr.eqns if equation.primitive.name == "reduce"]
+    assert len(reductions) == 1
+    assert len(reductions[0].outvars) == 4
+
+
+def test_more_results_than_operands():
+    powers = one_loop(lambda x: {"cube": x**3, "self": x, "square": x**2}, jnp.float32(3))
+    assert {name: x.item() for name, x in powers.items()} == {"self": 3, "square": 9, "cube": 27}
