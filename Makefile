@@ -7,7 +7,7 @@ EXTRAS ?= test
 CHECKPOINT ?= ckpt
 BIN := $(VENV)/bin
 
-.PHONY: train test test-all test-peers mutants eval lint docs setup
+.PHONY: train test test-all test-peers mutants eval lint types coverage hooks docs setup
 
 train: setup
 	$(BIN)/python train.py --num-envs 2048 --checkpoint $(CHECKPOINT) $(ARGS)
@@ -66,6 +66,18 @@ mutants: $(VENV)/installed-mutation
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+types: setup
+	$(BIN)/python -m mypy
+
+# The lines and branches of attjax/ that the tests run; with those missed, as HTML in site/coverage.
+# Compiled functions count where JAX traces them.
+coverage: setup
+	$(BIN)/python -m pytest -n 2 --dist worksteal --cov --cov-report=term-missing --cov-report=html $(ARGS)
+
+# What .pre-commit-config.yaml checks before each commit, in this environment and without a network.
+hooks: $(VENV)/installed-dev
+	$(BIN)/pre-commit install
 
 # The API reference, from the docstrings, as HTML in site/.
 docs: $(VENV)/installed-docs,plot,onnx,gym

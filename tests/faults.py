@@ -25,11 +25,13 @@ FAULTS = {
         "((i3 - i2) / i1, (i1 - i3) / i2, (i2 - i1) / i3)", PHYSICS,
     ),
     "gyroscopic term of a full tensor without its symmetric part": (
-        "attjax/equations.py", "factors = factors + factors.swapaxes(1, 2)", "factors = 2 * factors",
+        "attjax/equations.py",
+        "factors = factors + factors.swapaxes(1, 2)", "factors = 2 * factors",
         PHYSICS,
     ),
     "missing ½ in the kinematics": (
-        "attjax/quaternion.py", "0.5 * (w3 * q2 - w2 * q3 + w1 * qs)", "(w3 * q2 - w2 * q3 + w1 * qs)",
+        "attjax/quaternion.py",
+        "0.5 * (w3 * q2 - w2 * q3 + w1 * qs)", "(w3 * q2 - w2 * q3 + w1 * qs)",
         PHYSICS,
     ),
     "wrong order in RK4": (
@@ -37,10 +39,12 @@ FAULTS = {
         "k3 = equations.rate(advance(dt / 2, k1))", PHYSICS,
     ),
     "skipped normalisation": (
-        "attjax/dynamics.py", "return quaternions.normalize(quaternion)", "return (quaternion)", PHYSICS,
+        "attjax/dynamics.py",
+        "return quaternions.normalize(quaternion)", "return (quaternion)", PHYSICS,
     ),
     "one coasting step too many": (
-        "attjax/dynamics.py", "jnp.arange(agent_step.frameskip,", "jnp.arange(agent_step.frameskip + 1,",
+        "attjax/dynamics.py",
+        "jnp.arange(agent_step.frameskip,", "jnp.arange(agent_step.frameskip + 1,",
         PHYSICS,
     ),
     "torque twice as strong": (
@@ -54,25 +58,29 @@ FAULTS = {
         ["tests/test_reward.py", "tests/test_env.py"],
     ),
     "time limit before overspeed": (
-        "attjax/env.py", "truncated = ~terminated & (next_state.time", "truncated = (next_state.time",
+        "attjax/env.py",
+        "truncated = ~terminated & (next_state.time", "truncated = (next_state.time",
         ["tests/test_env.py"],
     ),
     "GAE bootstraps over a termination": (
-        "attjax/losses.py", "jnp.where(terminated, 0.0, next_values)", "next_values", ["tests/test_losses.py"],
+        "attjax/losses.py",
+        "jnp.where(terminated, 0.0, next_values)", "next_values", ["tests/test_losses.py"],
     ),
     "GAE runs over the end of an episode": (
         "attjax/losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)",
         ["tests/test_losses.py"],
     ),
     "clipped objective without the pessimistic bound": (
-        "attjax/losses.py", "objective = jnp.minimum(", "objective = jnp.maximum(", ["tests/test_losses.py"],
+        "attjax/losses.py",
+        "objective = jnp.minimum(", "objective = jnp.maximum(", ["tests/test_losses.py"],
     ),
     "annealing off by one": (
         "attjax/learner.py", "settings.final_learning_rate, settings.gradient_steps",
         "settings.final_learning_rate, settings.gradient_steps - settings.minibatches", LEARNING,
     ),
     "key reused from update to update": (
-        "attjax/rollout.py", "return learner.replace(key=key), steps", "return learner, steps", LEARNING,
+        "attjax/rollout.py",
+        "return learner.replace(key=key), steps", "return learner, steps", LEARNING,
     ),
     "same key for all steps of a rollout": (
         "attjax/rollout.py", "random = (uniform, jax.random.split(flight_key, (length, 2)))",
@@ -100,7 +108,8 @@ FAULTS = {
         "closest_rate=rate", ["tests/test_evaluation.py"],
     ),
     "impulse of a held torque is that of a pulse, in evaluation": (
-        "attjax/evaluation.py", "context.torque_duration", "(1 / 240)", ["tests/test_evaluation.py"],
+        "attjax/evaluation.py",
+        "context.torque_duration", "(1 / 240)", ["tests/test_evaluation.py"],
     ),
     "impulse of a held torque is that of a pulse, for a reward": (
         "attjax/env.py", "self.context(params).torque_duration,", "INTEGRATION_STEP,",
@@ -115,7 +124,8 @@ FAULTS = {
         "return 3 * numerics.square_root(jnp.sum(momentum)", ["tests/test_slew_references.py"],
     ),
     "reward_scale ignored": (
-        "attjax/rollout.py", "*= setup.settings.task.reward_scale", "*= 1.0", ["tests/test_rollout.py"],
+        "attjax/rollout.py",
+        "*= setup.settings.task.reward_scale", "*= 1.0", ["tests/test_rollout.py"],
     ),
     "max_gradient_norm ignored": (
         "attjax/learner.py", "if settings.max_gradient_norm > 0:", "if False:", DESCENT,
@@ -147,7 +157,8 @@ FAULTS = {
         ["tests/test_rate_limit.py"],
     ),
     "observation bound without coasting": (
-        "attjax/env.py", "(params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))",
+        "attjax/env.py",
+        "(params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))",
         "(params.rate_limit + kick)", ["tests/test_observation_space.py"],
     ),
     "optimizer not restored": (

@@ -18,8 +18,9 @@ from attjax.settings import FIELDS
 
 README = Page(ROOT / "README.md")
 INDEX = Page(ROOT / "docs" / "README.md")
-PAGES = [README, *(Page(path) for path in sorted((ROOT / "docs").rglob("*.md")))]
-LINKING = [*PAGES, *(Page(path) for path in ROOT.glob("*.md") if path != README.path)]
+CONTRIBUTING = Page(ROOT / "CONTRIBUTING.md")
+PAGES = [README, CONTRIBUTING, *(Page(path) for path in sorted((ROOT / "docs").rglob("*.md")))]
+LINKING = [*PAGES, Page(ROOT / "CHANGELOG.md")]
 LANGUAGES = {COMMANDS, "python", "text", "toml", "c", "json"}
 PEERS = ("gymnasium", "stable_baselines3", "sb3_contrib", "gymnax", "rejax", "evosax")
 
@@ -107,21 +108,6 @@ def assert_printed(expected, printed):
     assert matches, f"expected:\n{expected}\nprinted:\n{printed}"
 
 
-@each([page for page in PAGES if any(">>> " in block.text for block in page.blocks)])
-def test_doctests(page, clone):
-    """The examples of a page, one after another in one session."""
-    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
-    session, failures = {}, io.StringIO()
-    for block in page.blocks:
-        if block.language == "python" and ">>> " in block.text:
-            test = doctest.DocTestParser().get_doctest(
-                block.text, session, name(page), name(page), block.line - 1
-            )
-            runner.run(test, out=failures.write, clear_globs=False)
-            session = test.globs
-    assert runner.tries > 0 and runner.failures == 0, failures.getvalue()
-
-
 @each(LINKING)
 def test_links_lead_somewhere(page):
     for link in page.links:
@@ -153,9 +139,18 @@ def test_every_page_is_reached_from_the_index():
     assert "docs/README.md" in README.links
 
 
+def test_the_readme_fits_on_two_screens():
+    assert len(README.path.read_text().split()) <= 700
+
+
+def test_the_citation_names_this_version():
+    assert f"\nversion: {attjax.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+
+
 def test_every_preset_is_described():
+    text = (ROOT / "docs" / "train.md").read_text()
     for preset in PRESETS:
-        assert f"| `{preset}` |" in README.path.read_text()
+        assert f"| `{preset}` |" in text
 
 
 def test_the_table_of_presets_is_of_the_presets():

@@ -1,4 +1,4 @@
-"""One-way imports, as in README.md: a module knows only those of earlier layers."""
+"""One-way imports, as in docs/layout.md: a module knows only those of earlier layers."""
 
 import ast
 import importlib

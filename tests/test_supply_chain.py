@@ -60,7 +60,7 @@ def test_the_core_needs_these_packages_and_no_others():
 
 
 def test_core_modules_import_the_core_alone():
-    """The modules that import an extra's package are those that README.md names it for."""
+    """The modules that import an extra's package are those that docs/install.md names it for."""
     for path in SOURCES:
         if path.stem not in FOR_EXTRAS:
             for package in third_party(ast.parse(path.read_text())):
