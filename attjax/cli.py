@@ -7,7 +7,7 @@ import shlex
 from pathlib import Path
 from typing import Any, NoReturn
 
-from attjax import errors, fields, help_text, run_config, settings
+from attjax import errors, fields, help_text, settings
 
 Group = argparse._ActionsContainer
 """A parser, or a group of its flags."""
@@ -85,7 +85,7 @@ def add_seed_and_device(group: Group, seed_help: str) -> None:
 
 def add_frameskip(group: Group, meaning: str) -> None:
     """Add --frameskip, None where it is not given: one that suits the policy is chosen then."""
-    table_2 = run_config.TABLE_2
+    table_2 = fields.TABLE_2
     default = f"{table_2} as in Table 2 if that was trained, else the trained one nearest to it"
     help = f"{meaning} (default: {default})"
     add_number(group, "frameskip", int, None, help, **fields.FRAMESKIP)

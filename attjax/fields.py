@@ -13,6 +13,19 @@ SEED = {"low": 0, "below": 2**32}
 FRAMESKIP = {"low": 0, "below": 10_500}
 """Limits of each, as in :func:`setting`."""
 
+TABLE_2 = 5
+"""Frameskip of the paper's Table 2, 40 Hz."""
+
+
+def frameskip_to_judge(trained: tuple[int, ...] = ()) -> int:
+    """Table 2's frameskip, or the trained one that is nearest to it, the quicker of two.
+
+    Example:
+        >>> frameskip_to_judge((7, 3, 20)), frameskip_to_judge()
+        (3, 5)
+    """
+    return min(trained or [TABLE_2], key=lambda k: (abs(k - TABLE_2), k))
+
 
 def setting(help: str, *, unit: str = "", symbol: str = "", group: str = "", **limits):
     """A field without default.

@@ -8,8 +8,9 @@ import numpy as np
 
 from attjax import assembly, learner, metrics, metrics_file, nan_search, ppo
 from attjax.env import AttitudeEnv
+from attjax.fields import frameskip_to_judge
 from attjax.learner import Learner, Setup
-from attjax.run_config import Config, frameskip_to_judge
+from attjax.run_config import Config
 
 
 class Diverged(Exception):

@@ -9,9 +9,6 @@ from attjax.settings import Settings
 from attjax.specification import LM50, Spacecraft
 
 DEFAULT_PRESET = "precise"
-TABLE_2 = 5
-"""Frameskip of the paper's Table 2, 40 Hz."""
-
 CUSTOM = "custom"
 """The preset's name in a run whose settings were all given."""
 
@@ -54,16 +51,6 @@ def new(
     if preset not in (*PRESETS, CUSTOM):
         raise ValueError(f"preset is {preset!r}; it must be one of {', '.join(PRESETS)}")
     return Config(preset, seed, PRESETS.get(preset, PRECISE).replace(**values), spacecraft)
-
-
-def frameskip_to_judge(trained: tuple[int, ...] = ()) -> int:
-    """Table 2's frameskip, or the trained one that is nearest to it, the quicker of two.
-
-    Example:
-        >>> frameskip_to_judge((7, 3, 20)), frameskip_to_judge()
-        (3, 5)
-    """
-    return min(trained or [TABLE_2], key=lambda k: (abs(k - TABLE_2), k))
 
 
 def lengthened(config: Config, given: dict) -> Config:

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from attjax import presets, run_folder
+from attjax.settings import SUBJECT_OF
 
 # Orbax leaves coroutines behind where a file is damaged; processes of their own show no sign of it.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
@@ -30,7 +31,7 @@ def damage(draw, names):
     kind = draw(st.sampled_from(["remove", "empty", "cut", "flip", "garbage", "folder", "config"]))
     where, value = draw(st.floats(0, 1)), draw(JSON)
     garbage = draw(st.binary(max_size=200))
-    keys = sorted([*vars(presets.PRECISE), "program", "format", "preset", "seed", "settings"])
+    keys = sorted([*presets.PRECISE.flat, "program", "format", "preset", "seed", "settings"])
     key = draw(st.sampled_from(keys))
 
     def apply(folder):
@@ -44,7 +45,7 @@ def damage(draw, names):
         elif kind == "config":
             path = folder / run_folder.CONFIG
             config = json.loads(path.read_text())
-            (config if key in config else config["settings"])[key] = value
+            (config if key in config else config["settings"][SUBJECT_OF[key]])[key] = value
             path.write_text(json.dumps(config))
         else:
             flipped = data[:position] + bytes(255 - b for b in data[position : position + 1])

@@ -28,7 +28,7 @@ WORDS = st.one_of(
     st.sampled_from(["paper", "precise", "logarithmic", "multiscale", "cpu", "policy", "--resume"]),
 )
 SETTINGS = ["--" + name.replace("_", "-") for name in FIELDS]
-PLAUSIBLE = {"--" + name.replace("_", "-"): value for name, value in vars(presets.PRECISE).items()}
+PLAUSIBLE = {"--" + name.replace("_", "-"): value for name, value in presets.PRECISE.flat.items()}
 PLAUSIBLE |= {
     "--preset": "paper", "--seed": 1, "--save-every": 2.5, "--frameskip": 7, "--duration": 1.5,
     "--controller": "feedback", "--json": "result.json", "--plot": "figures", "--episodes": 3,

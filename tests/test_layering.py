@@ -35,7 +35,7 @@ LAYERS = [
     {"env"},
     {"controllers", "gymnax_compat", "features", "assurance"},
     {"networks", "losses", "rendering"},
-    {"learner", "evaluation", "gymnasium_task"},
+    {"learner", "evaluation", "gymnasium_task", "export_inputs"},
     {"gymnasium_vector"},
     {"gymnasium_env"},
     {"rollout", "descent"},

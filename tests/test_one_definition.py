@@ -93,6 +93,5 @@ def test_a_change_reaches_onnx(changed):
 
 
 def test_inputs_that_have_a_name_are_all_written_down_and_offered():
-    fields = settings.Settings.__dataclass_fields__
     names = set(features.FEATURES)
-    assert names == set(export_inputs.FORMS) == set(fields["features"].metadata["choices"])
+    assert names == set(export_inputs.FORMS) == set(settings.FIELDS["features"].metadata["choices"])

@@ -34,7 +34,7 @@ def test_a_run_goes_on_with_what_it_was_started_with(own):
     result = run("train.py", *flags, cwd=EXAMPLES)
     assert result.returncode == 0 and "resumed at" in result.stdout, result.stderr
     config = run_folder.read_config(own)
-    assert (config.spacecraft.name, config.settings.reward) == ("6U CubeSat", "rewards:frugal")
+    assert (config.spacecraft.name, config.settings.task.reward) == ("6U CubeSat", "rewards:frugal")
 
 
 def test_a_policy_flies_the_spacecraft_that_it_was_trained_on(own, tmp_path):

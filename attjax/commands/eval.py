@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from attjax import cli, config_file, destinations, devices, errors, run_config, run_folder
+from attjax import cli, config_file, destinations, devices, errors, fields, run_folder
 from attjax.commands import evaluation_output
 from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
 
@@ -87,7 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
         trained = _trained(arguments, names)
         if arguments.frameskip is None:
-            arguments.frameskip = run_config.frameskip_to_judge(trained or ())
+            arguments.frameskip = fields.frameskip_to_judge(trained or ())
         spacecraft = _spacecraft(arguments, names)
         controllers = {name: _controller(name, arguments, spacecraft) for name in names}
         if arguments.json not in (None, STDOUT):

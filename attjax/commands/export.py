@@ -5,7 +5,7 @@ import contextlib
 import importlib
 from collections.abc import Sequence
 
-from attjax import c_names, cli, destinations, devices, errors, run_config, run_folder
+from attjax import c_names, cli, destinations, devices, errors, fields, run_folder
 
 FORMATS = {
     "c": "attjax.export_c",
@@ -108,7 +108,7 @@ def _flight_policy(arguments):
         )
     frameskip = arguments.frameskip
     if frameskip is None:
-        frameskip = run_config.frameskip_to_judge(config.settings.task.frameskips)
+        frameskip = fields.frameskip_to_judge(config.settings.task.frameskips)
     with _exporting(folder):
         env = AttitudeEnv(frameskip, spacecraft=config.spacecraft)
         return FlightPolicy(policy, params, env, provenance.of_run(config, update, newest))
