@@ -163,6 +163,13 @@ def _check_pytest(arguments):
         assert word.startswith("-") or (ROOT / word.split("::")[0]).exists(), word
 
 
+def _check_installed(arguments):
+    """The command that the package brings: its first argument is a program."""
+    programs = {"train": train_script, "eval": eval_script, "export": export_script}
+    if arguments:
+        _check_arguments(programs[arguments[0]], arguments[1:])
+
+
 CHECKS = {
     "train.py": functools.partial(_check_arguments, train_script),
     "eval.py": functools.partial(_check_arguments, eval_script),
@@ -171,6 +178,7 @@ CHECKS = {
     "make": _check_make,
     "pip": _check_pip,
     "-m pip": _check_pip,
+    "-m attjax": _check_installed,
     "-m pytest": _check_pytest,
     "-m venv": lambda arguments: None,
     "tensorboard": lambda arguments: None,
@@ -193,9 +201,8 @@ def _evaluate(arguments):
 
 
 def _export(arguments):
-    module = export_script.FORMATS[export_script.parse_arguments(arguments).format]
     try:
-        export_script._module(module)
+        export_script._module(export_script.parse_arguments(arguments).format)
     except export_script.errors.UserError:  # the extra is not installed
         return
     _succeeds(export_script.main, [*arguments, "--device", "cpu"])

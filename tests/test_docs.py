@@ -160,7 +160,7 @@ def test_the_table_of_presets_is_of_the_presets():
     table = {setting: cells.split(" | ") for setting, cells in rows}
     assert set(names) == set(PRESETS)
     for field in FIELDS.values():
-        values = [shown(getattr(PRESETS[name], field.name)) for name in names]
+        values = [shown(PRESETS[name].flat[field.name]) for name in names]
         if field.name in table or len(set(values)) > 1:
             assert table[field.name] == values, field.name
 
@@ -190,10 +190,11 @@ def descriptions(module):
     for node, later in itertools.pairwise([*module.body, ast.Pass()]):
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             described[node.name] = ast.get_docstring(node)
-        elif isinstance(node, ast.Assign):
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
             is_text = isinstance(later, ast.Expr) and isinstance(later.value, ast.Constant)
             text = later.value.value if is_text else None
-            described |= {x.id: text for x in node.targets if isinstance(x, ast.Name)}
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            described |= {x.id: text for x in targets if isinstance(x, ast.Name)}
     return described
 
 
