@@ -55,7 +55,7 @@ def test_a_setting_has_a_group_a_meaning_and_its_true_defaults(field, capsys, mo
     group = text[text.index(f"\n{title}:\n") :].split("\n\n")[0]
     shown = entry(group + "\n\n", flag_of(field))
     assert len(field.metadata["help"]) > 10 and field.metadata["help"] in shown
-    values = {name: getattr(preset, field.name) for name, preset in presets.PRESETS.items()}
+    values = {name: preset.flat[field.name] for name, preset in presets.PRESETS.items()}
     if len(set(values.values())) == 1:
         ((_, default),) = re.findall(r"\((default): ([^)]*)\)$", shown)
         defaults = dict.fromkeys(values, default)
