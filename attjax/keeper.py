@@ -1,6 +1,7 @@
 """Keeps a training run in a folder: rows of metrics, checkpoints, TensorBoard's events."""
 
 import dataclasses
+import importlib
 import time
 from pathlib import Path
 
@@ -37,7 +38,7 @@ class Place:
             raise ValueError("resume and overwrite are both true; they exclude each other")
         if self.tensorboard:
             try:
-                import tensorboardX  # noqa: F401  before anything is written
+                importlib.import_module("tensorboardX")  # before anything is written
             except ImportError:
                 raise UserError(
                     "--tensorboard needs tensorboardX: pip install 'attjax[tensorboard]'"

@@ -13,7 +13,7 @@ from fuzzing import FUZZ, Accepted, content, refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from attjax import presets, training
+from attjax import keeper, presets
 from attjax.settings import FIELDS
 
 NUMBERS = st.one_of(
@@ -76,7 +76,7 @@ def test_random_training_command_lines(playground, no_work, monkeypatch):
     def no_run(*_, **__):
         raise Accepted
 
-    monkeypatch.setattr(training, "Run", no_run)
+    monkeypatch.setattr(keeper, "Run", no_run)
     before, count = content(playground), {True: 0, False: 0}
 
     @settings(max_examples=500, **FUZZ)
