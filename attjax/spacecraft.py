@@ -176,8 +176,8 @@ def applied_torque(action: chex.Array, params: EnvParams) -> chex.Array:
         (3,) torque, body frame, N m, for as long as the environment's context says.
 
     Example:
-        >>> applied_torque(4, default_params()).tolist()
-        [0.0, -0.5, 0.0]
+        >>> applied_torque(3, default_params()).tolist()
+        [0.0, 0.5, 0.0]
     """
     return params.torque_table[action]
 
