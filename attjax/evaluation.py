@@ -9,23 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import numerics, rigid_body
+from attjax import numerics
 from attjax import quaternion as quaternions
 from attjax.context import Context
-from attjax.controllers import average_torque
 from attjax.env import AttitudeEnv, observation_key, steps_key
 from attjax.spacecraft import EnvParams, EnvState
 from attjax.values import integer
 
 Controller = Callable[[chex.Array, Context], chex.Array]
 """``act(observation (11,), context) -> action``; a pytree, e.g. ``jax.tree_util.Partial``."""
-
-TABLE_5 = {
-    "slew1": (0.44228, 0.44228, 0.44228, 0.64279),
-    "slew2": (0.44228, -0.44228, 0.44228, 0.64279),
-    "slew3": (-0.44228, -0.44228, 0.44228, 0.64279),
-}
-"""Initial error quaternions of the paper's three control examples, 100° each."""
 
 STATISTICS = ("mean", "std", "min", "q1", "q2", "q3", "max")
 
@@ -71,14 +63,6 @@ class History:
 def random_slews(env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, episodes: int):
     """Observations (episodes, 11) and states at the start of ``episodes`` random slews."""
     return jax.vmap(env.reset, (0, None))(jax.random.split(key, episodes), params)
-
-
-def table_5_slews() -> EnvState:
-    """States at the start of the slews of TABLE_5, as a batch of 3, at rest."""
-    quaternion = jnp.array(list(TABLE_5.values()), float)
-    quaternion /= jnp.linalg.norm(quaternion, axis=-1, keepdims=True)
-    n = len(quaternion)
-    return EnvState(quaternion, jnp.zeros((n, 3)), jnp.zeros(n, jnp.int32))
 
 
 @functools.partial(jax.jit, static_argnames=("env", "episodes"))
@@ -240,17 +224,6 @@ def successes(flown: Episodes, params: EnvParams) -> np.ndarray:
 def settling_times(flown: Episodes, env: AttitudeEnv) -> np.ndarray:
     """Time of the first sample from which φ stays within the goal angle, s, (episodes,)."""
     return (np.asarray(flown.last_outside) + 1) * env.control_period
-
-
-def time_optimal_reference(quaternion: chex.Array, context: Context) -> chex.Array:
-    """Rest-to-rest time of a (4,) slew with decoupled axes, T = 2 √(Σ|θᵢ|Iᵢ/U), s.
-
-    U is the largest torque averaged over a control period. An estimate and no bound: turning
-    about other axes than the eigenaxis can be about a tenth quicker.
-    """
-    angle = quaternions.rotation_vector(quaternion)
-    momentum = jnp.abs(rigid_body.angular_momentum(context.inertia, angle))
-    return 2 * numerics.square_root(jnp.sum(momentum) / average_torque(context))
 
 
 def summarize(x: np.ndarray) -> dict:

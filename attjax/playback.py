@@ -8,10 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 
 import attjax
-from attjax import evaluation, template
+from attjax import evaluation, slew_references, template
 from attjax import quaternion as quaternions
 from attjax.env import AttitudeEnv
-from attjax.evaluation import TABLE_5, Controller
+from attjax.evaluation import Controller
 from attjax.spacecraft import EnvParams, EnvState
 from attjax.values import integer
 
@@ -72,12 +72,12 @@ def page(
 
 def _starts(env, params, key) -> EnvState:
     random = evaluation.random_slews(env, params, key, RANDOM_SLEWS)[1]
-    return jax.tree.map(lambda *x: jnp.concatenate(x), evaluation.table_5_slews(), random)
+    return jax.tree.map(lambda *x: jnp.concatenate(x), slew_references.table_5_slews(), random)
 
 
 def _slew_names(start):
     angles = np.rad2deg(jax.vmap(quaternions.error_angle)(start.quaternion))
-    names = [f"Table 5, test {number}" for number in range(1, len(TABLE_5) + 1)]
+    names = [f"Table 5, test {number}" for number in range(1, len(slew_references.TABLE_5) + 1)]
     names += [f"random {number}" for number in range(1, RANDOM_SLEWS + 1)]
     return [f"{name}: {angle:.1f}°" for name, angle in zip(names, angles)]
 

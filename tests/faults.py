@@ -116,11 +116,12 @@ FAULTS = {
         ["tests/test_env.py"],
     ),
     "sign in TABLE_5": (
-        "evaluation.py", '"slew2": (0.44228, -0.44228', '"slew2": (0.44228, 0.44228',
+        "attjax/slew_references.py",
+        '"slew2": (0.44228, -0.44228', '"slew2": (0.44228, 0.44228',
         ["tests/test_slew_references.py"],
     ),
     "factor of the time-optimal reference": (
-        "attjax/evaluation.py", "return 2 * numerics.square_root(jnp.sum(momentum)",
+        "attjax/slew_references.py", "return 2 * numerics.square_root(jnp.sum(momentum)",
         "return 3 * numerics.square_root(jnp.sum(momentum)", ["tests/test_slew_references.py"],
     ),
     "reward_scale ignored": (
@@ -166,7 +167,7 @@ FAULTS = {
         "    return restored.replace(optimizer=template.optimizer, key=", RUNS,
     ),
     "rows after the checkpoint kept": (
-        "metrics_file.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
+        "attjax/metrics_file.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
     ),
     "no lock on the folder": (
         "attjax/run_folder.py", "fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,

@@ -35,6 +35,7 @@ LAYERS = [
     {"env"},
     {"controllers", "gymnax_compat", "features", "assurance"},
     {"networks", "losses", "rendering"},
+    {"slew_references"},
     {"learner", "evaluation", "gymnasium_task", "export_inputs"},
     {"gymnasium_vector"},
     {"gymnasium_env"},

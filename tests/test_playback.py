@@ -12,7 +12,7 @@ from commands import eval_script, one_line_error
 from pages import CONTROLLERS, ENV, HOSTILE, embedded
 
 import attjax
-from attjax import AttitudeEnv, evaluation, playback
+from attjax import AttitudeEnv, evaluation, playback, slew_references
 
 
 def test_the_page_holds_the_recorded_flights():
@@ -37,7 +37,7 @@ def test_the_page_holds_the_recorded_flights():
     evaluated = evaluation.random_slews(env, params, jax.random.key(3), 500)[1]
     starts = jax.tree.map(
         lambda test, random: jnp.concatenate([test, random[: playback.RANDOM_SLEWS]]),
-        evaluation.table_5_slews(),
+        slew_references.table_5_slews(),
         evaluated,
     )
     for samples, controller in zip(data["flights"].swapaxes(0, 1), CONTROLLERS.values()):

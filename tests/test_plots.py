@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from matplotlib import image
 
-from attjax import AttitudeEnv, controllers, evaluation, learning_curve, plots
+from attjax import AttitudeEnv, controllers, evaluation, learning_curve, plots, slew_references
 from attjax import quaternion as quaternions
 from attjax.controllers import average_torque
 from attjax.spacecraft import EnvState
@@ -72,7 +72,7 @@ def test_recorded_slews_are_the_flown_ones(x64):
 
 
 def test_table_5_slews_are_100_degrees():
-    for quaternion in plots.TABLE_5.values():
+    for quaternion in slew_references.TABLE_5.values():
         angle = np.rad2deg(float(quaternions.error_angle(jnp.array(quaternion))))
         assert angle == pytest.approx(100, abs=0.01)
 
@@ -82,11 +82,12 @@ def test_time_optimal_reference_of_table_5():
     for frameskip, expected in ((20, 17.4), (5, 9.3)):
         env = AttitudeEnv(frameskip)
         context = env.context(env.default_params)
-        time = evaluation.time_optimal_reference(jnp.array(plots.TABLE_5["slew1"]), context)
+        slew = jnp.array(slew_references.TABLE_5["slew1"])
+        time = slew_references.time_optimal_reference(slew, context)
         assert float(time) == pytest.approx(expected, abs=0.05)
     acceleration = float(average_torque(context)) / 0.115
     about_y = jnp.array([0.0, np.sin(0.5), 0.0, np.cos(0.5)])  # 1 rad: half gained, half braked
-    time = evaluation.time_optimal_reference(about_y, context)
+    time = slew_references.time_optimal_reference(about_y, context)
     assert float(time) == pytest.approx(2 * np.sqrt(1 / acceleration), rel=1e-4)
 
 
