@@ -75,7 +75,7 @@ class Keeper:
             saved = checkpoint.restore_learner(folder, saved)
         steps = int(saved.update) * config.settings.ppo.steps_per_update
         file = metrics_file.MetricsFile(folder, steps)
-        self.run.go_on_from(saved, file.kept)
+        self.run.go_on_from(saved, file.kept, file.wall_s)
         self._logs = [file]
         if place.tensorboard:
             from attjax import tensorboard
@@ -85,10 +85,8 @@ class Keeper:
             run_folder.write_config(folder, config)
 
     def __enter__(self):
-        self._saver, self._saved = (
-            checkpoint.Saver(self._place.folder).__enter__(),
-            time.monotonic(),
-        )
+        self._saver = checkpoint.Saver(self._place.folder).__enter__()
+        self._saved = time.monotonic()
         return self
 
     def __exit__(self, *details):

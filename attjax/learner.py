@@ -77,8 +77,8 @@ class Learner:
         states: batched states of all spacecraft, (num_envs, ...), device by device.
         observation: (num_envs, size) current observations.
         score: (num_envs,) sum of ``info["score"]`` over the current episodes.
-        is_whole: (num_envs,) whether the current episodes started at time 0; only these count
-            in the metrics.
+        is_whole: (num_envs,) whether the current episodes began as the environment's
+            ``starts_whole`` asks; only these count in the metrics.
         key: typed random key.
         update: updates done, int32.
     """
@@ -151,7 +151,7 @@ def _init_on_device(setup, env_params, key):
         states=states,
         observation=observation,
         score=jnp.zeros(setup.envs_per_device, observation.dtype),
-        is_whole=states.time == 0,
+        is_whole=env.starts_whole(states),
         key=key,
         update=jnp.zeros((), jnp.int32),
     )

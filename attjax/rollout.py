@@ -93,7 +93,7 @@ def fly(
         states=states,
         observation=observation,
         score=jnp.where(ended, 0.0, score),
-        is_whole=jnp.where(ended, states.time == 0, learner.is_whole),
+        is_whole=jnp.where(ended, env.starts_whole(states), learner.is_whole),
     )
     return learner, results
 

@@ -36,10 +36,10 @@ class Run:
         self.learner = learner.init(setup, self.env_params, jax.random.key(config.seed))
         self.update, self.rows, self.wall_s, self._clock = 0, [], 0.0, None
 
-    def go_on_from(self, learner: Learner, rows: list[dict]) -> None:
-        """Take a saved learner for the one that it has, and the rows of metrics up to there."""
-        self.learner, self.update, self.rows = learner, int(learner.update), list(rows)
-        self.wall_s = float(rows[-1]["wall_s"]) if rows else 0.0
+    def go_on_from(self, learner: Learner, rows: list[dict], wall_s: float) -> None:
+        """Take a saved learner for the one that it has; its rows of metrics, and its clock."""
+        self.learner, self.update = learner, int(learner.update)
+        self.rows, self.wall_s = list(rows), wall_s
 
     @property
     def agent_steps(self) -> int:

@@ -1,6 +1,5 @@
 """Training from Python or from the command line: ``attjax.train``."""
 
-import contextlib
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -73,7 +72,7 @@ def train(
         settings: by name, in place of the preset's: any of ``train.py --help``.
 
     Returns:
-        The run: ``policy``, ``metrics``, ``env``, and all else of :class:`attjax.runs.run.Run`.
+        The run: ``policy``, ``metrics``, ``env``, and all else of :class:`attjax.run.Run`.
 
     Raises:
         ValueError: something given is not as said.
@@ -113,14 +112,14 @@ def _train(run, observer, keeper, debug_nans):
     if not run.is_complete and not observer.wants_to_stop():
         compiled = run.compiled(debug_nans)
     observer.compiled(run, compiled and time.monotonic() - start)
-    with contextlib.ExitStack() as stack:
-        stack.callback(observer.ended)
+    try:
         while compiled and not run.is_complete and not observer.wants_to_stop():
-            try:
-                row = run.train_block(compiled)
-            except Diverged as error:
-                kept = f"; {keeper.describe_saved()}" if keeper else ""
-                raise Diverged(f"{error}{kept}") from None
+            row = run.train_block(compiled)
             if keeper:
                 keeper.add(row)
             observer.block(row)
+    except Diverged as error:
+        kept = f"; {keeper.describe_saved()}" if keeper else ""
+        raise Diverged(f"{error}{kept}") from None
+    finally:
+        observer.ended()
