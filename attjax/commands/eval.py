@@ -197,11 +197,10 @@ def _controller(name, arguments, spacecraft):
     if name != POLICY:
         return jax.tree_util.Partial(controllers.CONTROLLERS[name])
     folder = arguments.checkpoint
-    update = checkpoint.best(folder) if arguments.best else None
     trained_on = run_folder.read_config(folder).spacecraft
     if trained_on.num_actions != spacecraft.num_actions:
         raise errors.UserError(
             f"{arguments.spacecraft} has {spacecraft.num_actions} actions; the policy in {folder} "
             f"chooses among {trained_on.num_actions}"
         )
-    return checkpoint.restore_policy(folder, update)
+    return checkpoint.load_policy(folder, use_best=arguments.best)
