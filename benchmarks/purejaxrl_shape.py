@@ -20,7 +20,7 @@ from attjax import AttitudeEnv
 from attjax.presets import PAPER_FAST
 
 VALUE_WEIGHT = 0.5
-DISCOUNT, GAE_LAMBDA, CLIP = PAPER_FAST.discount, PAPER_FAST.gae_lambda, PAPER_FAST.clip
+DISCOUNT, GAE_LAMBDA, CLIP = PAPER_FAST.ppo.discount, PAPER_FAST.ppo.gae_lambda, PAPER_FAST.ppo.clip
 
 
 class ActorCritic(nn.Module):
@@ -83,8 +83,8 @@ def init(env, workload, key) -> Runner:
     observation, env_states = jax.vmap(env.reset, (0, None))(keys, env.default_params)
     network = ActorCritic(workload.hidden_sizes, env.num_actions)
     transformation = optax.chain(
-        optax.clip_by_global_norm(PAPER_FAST.max_gradient_norm),
-        optax.adam(PAPER_FAST.learning_rate, eps=1e-5),
+        optax.clip_by_global_norm(PAPER_FAST.ppo.max_gradient_norm),
+        optax.adam(PAPER_FAST.ppo.learning_rate, eps=1e-5),
     )
     params = network.init(network_key, observation)
     train_state = TrainState.create(apply_fn=network.apply, params=params, tx=transformation)
@@ -126,7 +126,7 @@ def env_step(env, num_envs, runner: Runner, _) -> tuple[Runner, Transition]:
         action=action,
         log_probability=taken(nn.log_softmax(logits), action),
         value=value,
-        reward=reward * PAPER_FAST.reward_scale,
+        reward=reward * PAPER_FAST.task.reward_scale,
         done=terminated | truncated,
     )
     return runner.replace(env_states=env_states, observation=observation, key=key), transition
@@ -167,7 +167,7 @@ def loss(params, apply, transitions: Transition, advantages, targets):
     return (
         -objective
         + VALUE_WEIGHT * 0.5 * jnp.mean(errors)
-        - PAPER_FAST.entropy_coefficient * entropy
+        - PAPER_FAST.ppo.entropy_coefficient * entropy
     )
 
 

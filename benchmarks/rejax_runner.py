@@ -12,17 +12,17 @@ from attjax.presets import PAPER_FAST
 def prepare(workload: Workload):
     """A function that runs one update."""
     algorithm = rejax.PPO.create(
-        env=FiveValueEnv(AttitudeEnv(frameskip=20), PAPER_FAST.reward_scale),
+        env=FiveValueEnv(AttitudeEnv(frameskip=20), PAPER_FAST.task.reward_scale),
         num_envs=workload.num_envs,
         num_steps=workload.rollout_length,
         num_epochs=workload.passes,
         num_minibatches=workload.minibatches,
-        learning_rate=PAPER_FAST.learning_rate,
-        gamma=PAPER_FAST.discount,
-        gae_lambda=PAPER_FAST.gae_lambda,
-        clip_eps=PAPER_FAST.clip,
-        ent_coef=PAPER_FAST.entropy_coefficient,
-        max_grad_norm=PAPER_FAST.max_gradient_norm,
+        learning_rate=PAPER_FAST.ppo.learning_rate,
+        gamma=PAPER_FAST.ppo.discount,
+        gae_lambda=PAPER_FAST.ppo.gae_lambda,
+        clip_eps=PAPER_FAST.ppo.clip,
+        ent_coef=PAPER_FAST.ppo.entropy_coefficient,
+        max_grad_norm=PAPER_FAST.ppo.max_gradient_norm,
         agent_kwargs={"hidden_layer_sizes": workload.hidden_sizes, "activation": "relu"},
     )
     state = jax.jit(algorithm.init_state)(jax.random.key(0))

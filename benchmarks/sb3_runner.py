@@ -17,7 +17,7 @@ def environment(num_envs: int):
     network for each.
     """
     vector_env = gymnasium.make_vec(attjax.gymnasium_env.ID, num_envs=num_envs)
-    return as_vec_env(vector_env, PAPER_FAST.reward_scale, time_limit_terminates=True)
+    return as_vec_env(vector_env, PAPER_FAST.task.reward_scale, time_limit_terminates=True)
 
 
 def prepare(workload: Workload):
@@ -25,15 +25,15 @@ def prepare(workload: Workload):
     model = PPO(
         "MlpPolicy",
         environment(workload.num_envs),
-        learning_rate=PAPER_FAST.learning_rate,
+        learning_rate=PAPER_FAST.ppo.learning_rate,
         n_steps=workload.rollout_length,
         batch_size=workload.minibatch_size,
         n_epochs=workload.passes,
-        gamma=PAPER_FAST.discount,
-        gae_lambda=PAPER_FAST.gae_lambda,
-        clip_range=PAPER_FAST.clip,
-        ent_coef=PAPER_FAST.entropy_coefficient,
-        max_grad_norm=PAPER_FAST.max_gradient_norm,
+        gamma=PAPER_FAST.ppo.discount,
+        gae_lambda=PAPER_FAST.ppo.gae_lambda,
+        clip_range=PAPER_FAST.ppo.clip,
+        ent_coef=PAPER_FAST.ppo.entropy_coefficient,
+        max_grad_norm=PAPER_FAST.ppo.max_gradient_norm,
         policy_kwargs={
             "net_arch": {"pi": list(workload.hidden_sizes), "vf": list(workload.hidden_sizes)},
             "activation_fn": torch.nn.ReLU,

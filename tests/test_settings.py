@@ -1,10 +1,13 @@
 import dataclasses
 import json
+import operator
+import re
 
 import numpy as np
 import pytest
+from commands import ROOT
 
-from attjax import settings
+from attjax import presets, settings
 from attjax.presets import PAPER, PAPER_FAST, PRECISE, PRESETS
 
 
@@ -92,3 +95,20 @@ def test_every_name_has_one_subject():
     assert sum(map(len, subjects)) == len(settings.FIELDS)
     assert PRECISE.flat == {name: value for values in subjects for name, value in values.items()}
     assert PRECISE.replace() == PRECISE and PAPER.replace(**PRECISE.flat) == PRECISE
+
+
+USES = [
+    (path, *use)
+    for path in sorted(ROOT.glob("benchmarks/*.py"))
+    for use in re.findall(r"\b(PAPER|PAPER_FAST|PRECISE)((?:\.\w+)+)", path.read_text())
+]
+
+
+def test_benchmarks_read_what_presets_have():
+    """Most of them need packages that are not here, and so do not run in the tests."""
+    assert len(USES) > 10
+    for path, preset, names in USES:
+        try:
+            operator.attrgetter(names[1:])(getattr(presets, preset))
+        except AttributeError as error:
+            pytest.fail(f"{path.name}: {preset}{names}: {error}")
