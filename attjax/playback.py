@@ -11,7 +11,7 @@ import attjax
 from attjax import evaluation, slew_references, template
 from attjax import quaternion as quaternions
 from attjax.env import AttitudeEnv
-from attjax.evaluation import Controller
+from attjax.evaluation.episodes import Controller
 from attjax.spacecraft import EnvParams, EnvState
 from attjax.values import integer
 

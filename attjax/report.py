@@ -6,7 +6,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from attjax.evaluation import STATISTICS
+from attjax.evaluation.episodes import STATISTICS
 from attjax.specification import LM50, Spacecraft
 
 PAPER_TABLE_2 = {

@@ -7,9 +7,8 @@ import numpy as np
 
 import attjax
 from attjax import AttitudeEnv, spacecraft
-from attjax.dynamics import INTEGRATION_STEP
 from attjax.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
-from attjax.specification import LM50
+from attjax.specification import INTEGRATION_STEP, LM50
 
 FRAMESKIP = 20
 TOLERANCE = 1e-5

@@ -7,8 +7,8 @@ import numpy as np
 from batch import FLOAT, FRAMESKIP, Batch
 from single import INERTIA, SingleSlew
 
-from attjax.dynamics import INTEGRATION_STEP
 from attjax.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
+from attjax.specification import INTEGRATION_STEP
 
 STEP, HALF_STEP, SIXTH_STEP = FLOAT(INTEGRATION_STEP / np.array([1, 2, 6]))
 ZERO, HALF, ONE, TWO, NINE = FLOAT([0, 0.5, 1, 2, 9])

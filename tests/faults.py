@@ -35,20 +35,20 @@ FAULTS = {
         PHYSICS,
     ),
     "wrong order in RK4": (
-        "attjax/dynamics.py", "k3 = equations.rate(advance(dt / 2, k2))",
+        "attjax/dynamics/propagation.py", "k3 = equations.rate(advance(dt / 2, k2))",
         "k3 = equations.rate(advance(dt / 2, k1))", PHYSICS,
     ),
     "skipped normalisation": (
-        "attjax/dynamics.py",
+        "attjax/dynamics/propagation.py",
         "return quaternions.normalize(quaternion)", "return (quaternion)", PHYSICS,
     ),
     "one coasting step too many": (
-        "attjax/dynamics.py",
+        "attjax/dynamics/propagation.py",
         "jnp.arange(agent_step.frameskip,", "jnp.arange(agent_step.frameskip + 1,",
         PHYSICS,
     ),
     "torque twice as strong": (
-        "attjax/dynamics.py", "change = call(_first_step, start, equations)",
+        "attjax/dynamics/propagation.py", "change = call(_first_step, start, equations)",
         "change = call(_first_step, start, equations._replace("
         "torque=add(equations.torque, equations.torque)))", PHYSICS,
     ),
@@ -100,15 +100,17 @@ FAULTS = {
         "jax.random.fold_in(device_key, 0)", LEARNING,
     ),
     "closest angle is the last": (
-        "attjax/evaluation.py", "closest_angle=jnp.where(closer, angle, so_far.closest_angle)",
+        "attjax/evaluation/episodes.py",
+        "closest_angle=jnp.where(closer, angle, so_far.closest_angle)",
         "closest_angle=angle", ["tests/test_evaluation.py"],
     ),
     "closest rate is the last": (
-        "attjax/evaluation.py", "closest_rate=jnp.where(closer, rate, so_far.closest_rate)",
+        "attjax/evaluation/episodes.py",
+        "closest_rate=jnp.where(closer, rate, so_far.closest_rate)",
         "closest_rate=rate", ["tests/test_evaluation.py"],
     ),
     "impulse of a held torque is that of a pulse, in evaluation": (
-        "attjax/evaluation.py",
+        "attjax/evaluation/episodes.py",
         "context.torque_duration", "(1 / 240)", ["tests/test_evaluation.py"],
     ),
     "impulse of a held torque is that of a pulse, for a reward": (

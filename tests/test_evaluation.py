@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import attjax
-from attjax import AttitudeEnv, Spacecraft, evaluation, slew_references
+from attjax import AttitudeEnv, EnvState, Spacecraft, evaluation, slew_references
 from attjax import quaternion as quaternions
 from attjax.observation import ANGULAR_VELOCITY
 
@@ -128,7 +128,7 @@ def test_of_equal_angles_the_first_counts_and_the_goal_angle_is_inside(monkeypat
 def turning_towards_the_goal(key, params):
     half = -0.0275 / 2
     quaternion = jnp.array([np.sin(half), 0, 0, np.cos(half)], float)
-    return evaluation.EnvState(quaternion, jnp.array([0.1, 0, 0]), jnp.array(0, jnp.int32))
+    return EnvState(quaternion, jnp.array([0.1, 0, 0]), jnp.array(0, jnp.int32))
 
 
 def kick_late():

@@ -10,6 +10,7 @@ from setups import fly, small_attitude_setup
 
 import attjax
 from attjax import assembly, learner, ppo, presets
+from attjax.ppo import train
 from attjax.rollout import encode, episode_sums, greedy_rows, sample
 
 
@@ -18,7 +19,7 @@ def test_spacecraft_are_shared_out_among_the_control_rates():
     sizes = [group.stop - group.start for group in setup.slices]
     assert sum(sizes) == 64 and set(sizes) == {12, 13}
     env_params = assembly.env_params(setup)
-    discounts = ppo.discounts(setup.env, env_params, setup.settings.ppo, 64)
+    discounts = train.discounts(setup.env, env_params, setup.settings.ppo, 64)
     features = encode(setup.env, setup.policy, env_params, jnp.zeros((64, 11))).features
     for frameskip, group in zip((5, 7, 10, 14, 20), setup.slices):
         assert set(env_params.frameskip[group].tolist()) == {frameskip}

@@ -1,0 +1,33 @@
+"""Judging controllers: episodes, statistics, the paper's tables, figures, playback."""
+
+from attjax.evaluation.episodes import (
+    STATISTICS,
+    Controller,
+    Episodes,
+    History,
+    conditions,
+    evaluate,
+    fly,
+    random_slews,
+    record,
+    settling_times,
+    statistics,
+    successes,
+    summarize,
+)
+
+__all__ = [
+    "STATISTICS",
+    "Controller",
+    "Episodes",
+    "History",
+    "conditions",
+    "evaluate",
+    "fly",
+    "random_slews",
+    "record",
+    "settling_times",
+    "statistics",
+    "successes",
+    "summarize",
+]
