@@ -7,7 +7,8 @@ import shlex
 from pathlib import Path
 from typing import Any, NoReturn
 
-from attjax import errors, fields, help_text, settings
+from attjax import errors, fields, help_text
+from attjax.config import settings
 
 Group = argparse._ActionsContainer
 """A parser, or a group of its flags."""

@@ -30,7 +30,7 @@ def meaning(field: dataclasses.Field) -> str:
     """What a setting is: symbol, meaning, unit.
 
     Example:
-        >>> from attjax.settings import FIELDS
+        >>> from attjax.config.settings import FIELDS
         >>> meaning(FIELDS["discount"])
         'γ: discount of later rewards (Eq. 2)'
     """

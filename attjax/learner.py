@@ -15,8 +15,8 @@ from flax import struct
 
 from attjax import sharding
 from attjax import vector as batch
+from attjax.config.settings import PPO, Settings
 from attjax.networks import Policy
-from attjax.settings import PPO, Settings
 from attjax.sharding import SHARED, SPLIT
 
 

@@ -1,6 +1,6 @@
 """The three training recipes. Every value can be overridden from the command line."""
 
-from attjax.settings import PPO, Logging, Network, Settings, Task
+from attjax.config.settings import PPO, Logging, Network, Settings, Task
 
 PAPER = Settings(
     task=Task(

@@ -13,7 +13,8 @@ import re
 import uuid
 from pathlib import Path
 
-from attjax import belongings, settings, specification
+from attjax import belongings, specification
+from attjax.config import settings
 from attjax.errors import UserError, warning_line
 from attjax.run_config import Config
 

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from attjax import assembly, run_config, run_folder
+from attjax.config.settings import Settings
 from attjax.keeper import Keeper, Place
 from attjax.run import Diverged, Run
-from attjax.settings import Settings
 from attjax.specification import Spacecraft
 
 

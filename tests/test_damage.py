@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from attjax import presets, run_folder
-from attjax.settings import SUBJECT_OF
+from attjax.config.settings import SUBJECT_OF
 
 # Orbax leaves coroutines behind where a file is damaged; processes of their own show no sign of it.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")

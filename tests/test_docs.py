@@ -13,8 +13,8 @@ from commands import ROOT
 from markdown import COMMANDS, FENCE, Page
 
 import attjax
+from attjax.config.settings import FIELDS
 from attjax.presets import PRESETS
-from attjax.settings import FIELDS
 
 README = Page(ROOT / "README.md")
 INDEX = Page(ROOT / "docs" / "README.md")

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from attjax import keeper, presets
-from attjax.settings import FIELDS
+from attjax.config.settings import FIELDS
 
 NUMBERS = st.one_of(
     st.integers(-3, 3),

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from test_export import needs_compiler, random_states
 
-from attjax import assurance, export_c, export_inputs, features, quaternion, settings
+from attjax import assurance, export_c, export_inputs, features, quaternion
+from attjax.config import settings
 from attjax.features import Multiscale
 
 KINEMATICS, RATE_MASK = quaternion.derivative, assurance.rate_mask

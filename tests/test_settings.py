@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from commands import ROOT
 
-from attjax import presets, settings
+from attjax import presets
+from attjax.config import settings
 from attjax.presets import PAPER, PAPER_FAST, PRECISE, PRESETS
 
 

@@ -1,9 +1,9 @@
 """What ``train.py`` prints of a run: what it is, how it goes, how it ended."""
 
 from attjax import cli, errors, learner
+from attjax.config.settings import Settings
 from attjax.progress import Progress
 from attjax.run import Diverged, Run
-from attjax.settings import Settings
 from attjax.signals import StopSignals
 from attjax.training import Observer
 

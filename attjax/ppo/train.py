@@ -12,10 +12,10 @@ import jax.numpy as jnp
 
 from attjax import losses, sharding
 from attjax import vector as batch
+from attjax.config.settings import PPO
 from attjax.descent import Sample, optimize
 from attjax.learner import LEARNER_SPECS, Learner, Setup
 from attjax.rollout import Step, encode, episode_sums, rollout
-from attjax.settings import PPO
 from attjax.sharding import AXIS, SHARED
 
 

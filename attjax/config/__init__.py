@@ -1,0 +1,1 @@
+"""What defines a run, and how users say it: settings, presets, files, arguments. No JAX."""
