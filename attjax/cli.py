@@ -7,8 +7,8 @@ import shlex
 from pathlib import Path
 from typing import Any, NoReturn
 
-from attjax import errors, fields, help_text
-from attjax.config import settings
+from attjax import errors, help_text
+from attjax.config import fields, settings
 
 Group = argparse._ActionsContainer
 """A parser, or a group of its flags."""
@@ -102,7 +102,7 @@ def warn_of_untrained(frameskip: int, trained: tuple[int, ...] | None) -> None:
 def add_number(
     group: Group, name: str, kind: type, default: float | None, help: str, **details: Any
 ) -> None:
-    """Add the flag of a number with details as in :func:`attjax.fields.setting`."""
+    """Add the flag of a number with details as in :func:`attjax.config.fields.setting`."""
     field = fields.single(name, kind, help, **details)
     help = help_text.meaning(field)
     group.add_argument(

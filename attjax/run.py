@@ -7,8 +7,8 @@ import jax
 import numpy as np
 
 from attjax import assembly, learner, metrics, metrics_file, nan_search, ppo
+from attjax.config.fields import frameskip_to_judge
 from attjax.env import AttitudeEnv
-from attjax.fields import frameskip_to_judge
 from attjax.learner import Learner, Setup
 from attjax.run_config import Config
 

@@ -7,7 +7,7 @@ than a name. This module imports nothing heavy, so that ``--help`` is instant.
 import dataclasses
 import functools
 
-from attjax.fields import FRAMESKIP, GROUPS, Checked, setting
+from attjax.config.fields import FRAMESKIP, GROUPS, Checked, setting
 
 MOST_SAMPLES = 2**27
 """Of an update: some 100 GB."""
