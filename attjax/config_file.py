@@ -7,8 +7,8 @@ import textwrap
 import tomllib
 from pathlib import Path
 
-from attjax import help_text, presets, specification, streams
-from attjax.config import fields, settings
+from attjax import help_text, specification, streams
+from attjax.config import fields, presets, settings
 from attjax.errors import UserError
 from attjax.run_config import Config
 from attjax.specification import Spacecraft

@@ -5,7 +5,7 @@ import dataclasses
 import shutil
 import textwrap
 
-from attjax import presets
+from attjax.config import presets
 
 MOST_COLUMNS = 100
 

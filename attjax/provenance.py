@@ -3,7 +3,7 @@
 import dataclasses
 
 import attjax
-from attjax import presets
+from attjax.config import presets
 from attjax.run_config import Config
 from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft
 

@@ -3,9 +3,9 @@
 import dataclasses
 import operator
 
+from attjax.config.presets import PRECISE, PRESETS
 from attjax.config.settings import Settings
 from attjax.errors import UserError
-from attjax.presets import PRECISE, PRESETS
 from attjax.specification import LM50, Spacecraft
 
 DEFAULT_PRESET = "precise"

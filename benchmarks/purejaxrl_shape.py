@@ -17,7 +17,7 @@ from flax import struct
 from flax.training.train_state import TrainState
 
 from attjax import AttitudeEnv
-from attjax.presets import PAPER_FAST
+from attjax.config.presets import PAPER_FAST
 
 VALUE_WEIGHT = 0.5
 DISCOUNT, GAE_LAMBDA, CLIP = PAPER_FAST.ppo.discount, PAPER_FAST.ppo.gae_lambda, PAPER_FAST.ppo.clip

@@ -5,8 +5,8 @@ import rejax
 from contenders import Workload, serve
 
 from attjax import AttitudeEnv
+from attjax.config.presets import PAPER_FAST
 from attjax.gymnax_compat import FiveValueEnv
-from attjax.presets import PAPER_FAST
 
 
 def prepare(workload: Workload):

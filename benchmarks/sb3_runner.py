@@ -6,7 +6,7 @@ from contenders import Workload, serve
 from stable_baselines3 import PPO
 
 import attjax.gymnasium_env
-from attjax.presets import PAPER_FAST
+from attjax.config.presets import PAPER_FAST
 from attjax.sb3 import as_vec_env
 
 

@@ -124,7 +124,8 @@ def train(hidden_sizes: list[int], minibatch_size: int, cores: int) -> dict:
     """Throughput of training with the default preset, in blocks of one update."""
     import jax
 
-    from attjax import assembly, learner, ppo, presets
+    from attjax import assembly, learner, ppo
+    from attjax.config import presets
 
     changes = {"hidden_sizes": tuple(hidden_sizes), "minibatch_size": minibatch_size}
     settings = presets.PRECISE.replace(**changes)

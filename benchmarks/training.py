@@ -128,7 +128,8 @@ def prepare_attjax(workload: Workload):
     """A function that runs one update of train.py's program."""
     import jax
 
-    from attjax import assembly, learner, ppo, presets
+    from attjax import assembly, learner, ppo
+    from attjax.config import presets
 
     settings = presets.PAPER_FAST.replace(**dataclasses.asdict(workload))
     setup = assembly.setup(settings)

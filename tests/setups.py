@@ -4,7 +4,8 @@ import functools
 
 from jax.sharding import PartitionSpec
 
-from attjax import assembly, learner, presets, sharding
+from attjax import assembly, learner, sharding
+from attjax.config import presets
 from attjax.rollout import rollout
 
 SMALL = {

@@ -9,9 +9,9 @@ from commands import STEPS_PER_UPDATE, TINY, eval_script, run
 
 import attjax
 from attjax import LM50, AttitudeEnv, Spacecraft, checkpoint, controllers
+from attjax.config.presets import PAPER_FAST
 from attjax.errors import UserError
 from attjax.keeper import Place
-from attjax.presets import PAPER_FAST
 from attjax.run import Diverged
 from attjax.run_folder import FolderError
 

@@ -5,7 +5,8 @@ import jax
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, presets, run_folder
+from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, run_folder
+from attjax.config import presets
 from attjax.run_config import Config
 from attjax.run_folder import FolderError
 

@@ -5,7 +5,8 @@ import tomllib
 import pytest
 from commands import ROOT, one_line_error, run, train_script
 
-from attjax import config_file, presets, run_config, run_folder
+from attjax import config_file, run_config, run_folder
+from attjax.config import presets
 from attjax.errors import UserError
 from attjax.specification import LM50
 

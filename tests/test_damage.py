@@ -11,7 +11,8 @@ from fuzzing import FUZZ, content, refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from attjax import presets, run_folder
+from attjax import run_folder
+from attjax.config import presets
 from attjax.config.settings import SUBJECT_OF
 
 # Orbax leaves coroutines behind where a file is damaged; processes of their own show no sign of it.

@@ -13,8 +13,8 @@ from commands import ROOT
 from markdown import COMMANDS, FENCE, Page
 
 import attjax
+from attjax.config.presets import PRESETS
 from attjax.config.settings import FIELDS
-from attjax.presets import PRESETS
 
 README = Page(ROOT / "README.md")
 INDEX = Page(ROOT / "docs" / "README.md")

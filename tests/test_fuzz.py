@@ -13,7 +13,8 @@ from fuzzing import FUZZ, Accepted, content, refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from attjax import keeper, presets
+from attjax import keeper
+from attjax.config import presets
 from attjax.config.settings import FIELDS
 
 NUMBERS = st.one_of(

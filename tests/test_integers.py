@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import attjax
-from attjax import AttitudeEnv, controllers, evaluation, presets, run_config
+from attjax import AttitudeEnv, controllers, evaluation, run_config
+from attjax.config import presets
 from attjax.specification import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")

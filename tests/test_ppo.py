@@ -9,7 +9,8 @@ from jax.sharding import PartitionSpec
 from probes import Probe
 from setups import fly, settings, small_attitude_setup
 
-from attjax import AttitudeEnv, assembly, descent, learner, ppo, presets, sharding
+from attjax import AttitudeEnv, assembly, descent, learner, ppo, sharding
+from attjax.config import presets
 from attjax.networks import Policy
 
 

@@ -9,7 +9,8 @@ import pytest
 from setups import fly, small_attitude_setup
 
 import attjax
-from attjax import assembly, learner, ppo, presets
+from attjax import assembly, learner, ppo
+from attjax.config import presets
 from attjax.ppo import train
 from attjax.rollout import encode, episode_sums, greedy_rows, sample
 

@@ -12,7 +12,7 @@ import pytest
 from test_checkpoint import CONFIG
 
 from attjax import run_config, run_folder
-from attjax.presets import PRECISE
+from attjax.config.presets import PRECISE
 from attjax.run_folder import FolderError
 
 

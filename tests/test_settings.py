@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from commands import ROOT
 
-from attjax import presets
-from attjax.config import settings
-from attjax.presets import PAPER, PAPER_FAST, PRECISE, PRESETS
+from attjax.config import presets, settings
+from attjax.config.presets import PAPER, PAPER_FAST, PRECISE, PRESETS
 
 
 def test_paper_presets_hold_what_the_paper_names():

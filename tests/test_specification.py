@@ -21,7 +21,7 @@ from attjax import (
     slew_references,
     specification,
 )
-from attjax.presets import PAPER
+from attjax.config.presets import PAPER
 from attjax.run_config import Config
 from attjax.specification import LM50
 

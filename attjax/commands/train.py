@@ -3,8 +3,8 @@
 import argparse
 from collections.abc import Sequence
 
-from attjax import cli, config_file, devices, errors, presets, run_config, signals
-from attjax.config import fields
+from attjax import cli, config_file, devices, errors, run_config, signals
+from attjax.config import fields, presets
 
 USAGE = "%(prog)s [--preset NAME] [--checkpoint FOLDER] [--resume] [FLAG ...]"
 EXAMPLES = """\

@@ -151,7 +151,7 @@ class Settings:
         ValueError: a value is out of its range, or two values do not fit together.
 
     Example:
-        >>> from attjax.presets import PAPER
+        >>> from attjax.config.presets import PAPER
         >>> wide = PAPER.replace(hidden_sizes=(512, 512), num_envs=64)
         >>> wide.network.hidden_sizes, wide.ppo.num_envs
         ((512, 512), 64)
