@@ -8,13 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from attjax import assurance, learner, spacecraft, user_functions
+from attjax.config.run import Config
 from attjax.config.settings import Settings
 from attjax.env import AttitudeEnv
 from attjax.errors import UserValueError
 from attjax.features import FEATURES
 from attjax.networks import Policy
 from attjax.reward import REWARDS
-from attjax.run_config import Config
 from attjax.specification import LM50, Spacecraft
 
 MAX_DEVICES = 8

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from attjax import help_text, specification, streams
 from attjax.config import fields, presets, settings
+from attjax.config.run import Config
 from attjax.errors import UserError
-from attjax.run_config import Config
 from attjax.specification import Spacecraft
 
 SETTINGS = settings.FIELDS

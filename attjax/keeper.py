@@ -5,7 +5,8 @@ import importlib
 import time
 from pathlib import Path
 
-from attjax import assembly, checkpoint, metrics_file, run_config, run_folder
+from attjax import assembly, checkpoint, metrics_file, run_folder
+from attjax.config import run as run_config
 from attjax.errors import UserError
 from attjax.run import Run
 

@@ -4,7 +4,7 @@ import dataclasses
 
 import attjax
 from attjax.config import presets
-from attjax.run_config import Config
+from attjax.config.run import Config
 from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft
 
 

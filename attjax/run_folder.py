@@ -15,8 +15,8 @@ from pathlib import Path
 
 from attjax import belongings, specification
 from attjax.config import settings
+from attjax.config.run import Config
 from attjax.errors import UserError, warning_line
-from attjax.run_config import Config
 
 try:
     import fcntl

@@ -17,7 +17,8 @@ from tensorboardX.proto.summary_pb2 import Summary
 from tensorboardX.record_writer import masked_crc32c
 from tensorboardX.summary import hparams
 
-from attjax import belongings, metrics, metrics_file, run_config, run_folder
+from attjax import belongings, metrics, metrics_file, run_folder
+from attjax.config import run as run_config
 
 RATE = "time/steps_per_s"
 """Agent steps a second between two rows."""

@@ -4,7 +4,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from attjax import assembly, run_config, run_folder
+from attjax import assembly, run_folder
+from attjax.config import run as run_config
 from attjax.config.settings import Settings
 from attjax.keeper import Keeper, Place
 from attjax.run import Diverged, Run

@@ -7,7 +7,8 @@ import pytest
 from commands import STEPS_PER_UPDATE, train_script
 from test_checkpoint import CONFIG
 
-from attjax import belongings, checkpoint, run_config, run_folder
+from attjax import belongings, checkpoint, run_folder
+from attjax.config import run as run_config
 from attjax.run_folder import FolderError
 
 NEW = run_config.Config("paper", 1, CONFIG.settings)

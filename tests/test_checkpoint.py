@@ -7,7 +7,7 @@ import pytest
 
 from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, run_folder
 from attjax.config import presets
-from attjax.run_config import Config
+from attjax.config.run import Config
 from attjax.run_folder import FolderError
 
 SETTINGS = presets.PRECISE.replace(

@@ -5,8 +5,9 @@ import tomllib
 import pytest
 from commands import ROOT, one_line_error, run, train_script
 
-from attjax import config_file, run_config, run_folder
+from attjax import config_file, run_folder
 from attjax.config import presets
+from attjax.config import run as run_config
 from attjax.errors import UserError
 from attjax.specification import LM50
 

@@ -9,8 +9,9 @@ import time
 import pytest
 from commands import ROOT, TINY, eval_script, export_script, run, train_script
 
-from attjax import config_file, help_text, run_config, streams
+from attjax import config_file, help_text, streams
 from attjax.config import fields, presets, settings
+from attjax.config import run as run_config
 
 SCRIPTS = {"train.py": train_script, "eval.py": eval_script, "export.py": export_script}
 FIELDS = settings.FIELDS.values()

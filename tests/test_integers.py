@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import attjax
-from attjax import AttitudeEnv, controllers, evaluation, run_config
+from attjax import AttitudeEnv, controllers, evaluation
 from attjax.config import presets
+from attjax.config import run as run_config
 from attjax.specification import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")

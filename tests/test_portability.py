@@ -8,7 +8,8 @@ import pytest
 from commands import TINY, run
 from test_checkpoint import SETTINGS
 
-from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, run_config, run_folder, step
+from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, run_folder, step
+from attjax.config import run as run_config
 from attjax.networks import Policy
 
 

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from test_checkpoint import CONFIG
 
-from attjax import run_config, run_folder
+from attjax import run_folder
+from attjax.config import run as run_config
 from attjax.config.presets import PRECISE
 from attjax.run_folder import FolderError
 
@@ -126,7 +127,8 @@ def test_files_that_are_no_configuration_are_refused(tmp_path, text):
 def test_only_one_process_trains_in_a_folder(tmp_path):
     script = f"""
 import pathlib, sys
-from attjax import run_config, run_folder
+from attjax import run_folder
+from attjax.config import run as run_config
 with run_folder.opened(pathlib.Path({str(tmp_path)!r})):
     print("open", flush=True)
     sys.stdin.read()

@@ -22,7 +22,7 @@ from attjax import (
     specification,
 )
 from attjax.config.presets import PAPER
-from attjax.run_config import Config
+from attjax.config.run import Config
 from attjax.specification import LM50
 
 CUBESAT = Spacecraft(

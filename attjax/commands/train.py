@@ -3,8 +3,9 @@
 import argparse
 from collections.abc import Sequence
 
-from attjax import cli, config_file, devices, errors, run_config, signals
+from attjax import cli, config_file, devices, errors, signals
 from attjax.config import fields, presets
+from attjax.config import run as run_config
 
 USAGE = "%(prog)s [--preset NAME] [--checkpoint FOLDER] [--resume] [FLAG ...]"
 EXAMPLES = """\
