@@ -5,8 +5,8 @@ import tomllib
 import pytest
 from commands import ROOT, one_line_error, run, train_script
 
-from attjax import config_file, run_folder
-from attjax.config import presets
+from attjax import run_folder
+from attjax.config import presets, toml
 from attjax.config import run as run_config
 from attjax.errors import UserError
 from attjax.specification import LM50
@@ -15,9 +15,9 @@ from attjax.specification import LM50
 @pytest.mark.parametrize("preset", presets.PRESETS)
 def test_a_printed_file_reads_as_what_it_was_printed_from(tmp_path, preset):
     path = tmp_path / "run.toml"
-    path.write_text(config_file.text(run_config.Config(preset, 7, presets.PRESETS[preset])))
+    path.write_text(toml.text(run_config.Config(preset, 7, presets.PRESETS[preset])))
     expected = {"preset": preset, "seed": 7, "spacecraft": LM50} | presets.PRESETS[preset].flat
-    assert config_file.read(path) == expected
+    assert toml.read(path) == expected
 
 
 def test_flags_override_the_file_and_the_file_the_preset(tmp_path, capsys):
@@ -33,7 +33,7 @@ def test_flags_override_the_file_and_the_file_the_preset(tmp_path, capsys):
 def test_a_printed_file_reproduces_the_run_and_agrees_with_resuming_it(trained, tmp_path, capsys):
     config = run_folder.read_config(trained[0])
     path = tmp_path / "run.toml"
-    path.write_text(config_file.text(config))
+    path.write_text(toml.text(config))
     folder = tmp_path / "again"
     flags = ["--config", path, "--device", "cpu", "--checkpoint"]
     for _ in range(2):
@@ -74,4 +74,4 @@ def test_files_that_cannot_be_read(tmp_path, capsys):
         error = one_line_error(train_script.main, ["--config", str(path)], capsys)
         assert f"--config {path} cannot be read" in error
     with pytest.raises(UserError):
-        config_file.read(ROOT / "nowhere")
+        toml.read(ROOT / "nowhere")

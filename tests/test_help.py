@@ -9,8 +9,8 @@ import time
 import pytest
 from commands import ROOT, TINY, eval_script, export_script, run, train_script
 
-from attjax import config_file, help_text, streams
-from attjax.config import fields, presets, settings
+from attjax import help_text, streams
+from attjax.config import fields, presets, settings, toml
 from attjax.config import run as run_config
 
 SCRIPTS = {"train.py": train_script, "eval.py": eval_script, "export.py": export_script}
@@ -118,7 +118,7 @@ def test_errors_print_in_ascii():
 
 
 def test_a_printed_file_is_ascii_and_explains_every_setting():
-    text = config_file.text(run_config.Config("paper", 3, presets.PAPER))
+    text = toml.text(run_config.Config("paper", 3, presets.PAPER))
     assert text.isascii()
     lines = text.splitlines()
     assert max(map(len, lines)) <= 100

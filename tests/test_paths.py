@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from commands import eval_script, export_script, one_line_error, python, train_script
 
-from attjax import cli, config_file, run_folder
-from attjax.config import presets
+from attjax import cli, run_folder
+from attjax.config import presets, toml
 from attjax.config import run as run_config
 
 SCRIPTS = {"train.py": train_script, "eval.py": eval_script, "export.py": export_script}
@@ -103,10 +103,10 @@ run_folder.create(Path({str(tmp_path)!r}), config, overwrite=False)
 def test_toml_with_a_byte_order_mark_is_read(tmp_path, mark, encoding):
     path = tmp_path / "run.toml"
     path.write_bytes(mark + 'preset = "paper"\r\nseed = 5 # Größe\r\n'.encode(encoding))
-    assert config_file.read(path) == {"preset": "paper", "seed": 5}
+    assert toml.read(path) == {"preset": "paper", "seed": 5}
     craft = 'name = "Größe"\ninertia = [1, 1, 1]\ntorque_levels = [0.1]\n'
     path.write_bytes(mark + craft.encode(encoding))
-    assert config_file.read_spacecraft(path).name == "Größe"
+    assert toml.read_spacecraft(path).name == "Größe"
 
 
 def test_toml_of_endless_depth_is_one_line(tmp_path, capsys):

@@ -15,12 +15,12 @@ from attjax import (
     AttitudeEnv,
     Spacecraft,
     assurance,
-    config_file,
     controllers,
     evaluation,
     slew_references,
     specification,
 )
+from attjax.config import toml
 from attjax.config.presets import PAPER
 from attjax.config.run import Config
 from attjax.specification import LM50
@@ -216,5 +216,5 @@ def test_any_description_is_flown_or_refused_in_a_line(values, odd):
     observation, state = env.reset(jax.random.key(0), env.default_params)
     after = env.step_env(None, state, env.num_actions - 1, env.default_params)[0]
     assert np.all(np.isfinite(observation)) and np.all(np.isfinite(after))
-    again = tomllib.loads(config_file.text(Config("paper", 0, FASTEST, spacecraft)))["spacecraft"]
+    again = tomllib.loads(toml.text(Config("paper", 0, FASTEST, spacecraft)))["spacecraft"]
     assert specification.from_lists(again) == spacecraft

@@ -8,9 +8,9 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from attjax import cli, config_file, destinations, devices, errors, run_folder
+from attjax import cli, destinations, devices, errors, run_folder
 from attjax.commands import evaluation_output
-from attjax.config import fields
+from attjax.config import fields, toml
 from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
 
 POLICY = "policy"
@@ -168,7 +168,7 @@ def _trained(arguments, names):
 def _spacecraft(arguments, names):
     """What flies, with the duration that was asked for."""
     if arguments.spacecraft is not None:
-        spacecraft = config_file.read_spacecraft(arguments.spacecraft)
+        spacecraft = toml.read_spacecraft(arguments.spacecraft)
     elif POLICY in names:
         spacecraft = run_folder.read_config(arguments.checkpoint).spacecraft
     else:

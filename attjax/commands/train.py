@@ -3,8 +3,8 @@
 import argparse
 from collections.abc import Sequence
 
-from attjax import cli, config_file, devices, errors, signals
-from attjax.config import fields, presets
+from attjax import cli, devices, errors, signals
+from attjax.config import fields, presets, toml
 from attjax.config import run as run_config
 
 USAGE = "%(prog)s [--preset NAME] [--checkpoint FOLDER] [--resume] [FLAG ...]"
@@ -68,7 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         given = _given(arguments)
         new = run_config.new(**given)
     if arguments.print_config:
-        print(config_file.text(new), end="")
+        print(toml.text(new), end="")
         return 0
     with signals.StopSignals() as stop, errors.one_line_errors():
         place = {
@@ -104,10 +104,10 @@ def _train(given, place, stop, arguments):
 
 def _given(arguments):
     """By name, what the command line says of the run, and the file where it says nothing."""
-    given = {} if arguments.config is None else config_file.read(arguments.config)
+    given = {} if arguments.config is None else toml.read(arguments.config)
     for name in ("preset", "seed"):
         if getattr(arguments, name) is not None:
             given[name] = getattr(arguments, name)
     if arguments.spacecraft is not None:
-        given["spacecraft"] = config_file.read_spacecraft(arguments.spacecraft)
+        given["spacecraft"] = toml.read_spacecraft(arguments.spacecraft)
     return given | cli.overrides(arguments)
