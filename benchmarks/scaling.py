@@ -16,7 +16,8 @@ import time
 
 import common
 
-from attjax import cli, errors
+from attjax import errors
+from attjax.config import arguments as cli
 
 NUM_ENVS = (2048, 8192, 32768, 131072, 524288, 1048576)
 NETWORKS = ((400, 300), (64, 64))

@@ -14,7 +14,8 @@ import sys
 import common
 import numpy as np
 
-from attjax import cli, errors
+from attjax import errors
+from attjax.config import arguments as cli
 
 NUM_ENVS = (1, 4, 16, 64, 256, 1024, 2048, 4096, 16384, 65536, 262144, 1048576)
 RK4_STEPS = 21

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from commands import eval_script, export_script, one_line_error, python, train_script
 
-from attjax import cli, run_folder
+from attjax import run_folder
+from attjax.config import arguments as cli
 from attjax.config import presets, toml
 from attjax.config import run as run_config
 

@@ -5,7 +5,8 @@ import sys
 from collections.abc import Sequence
 
 import attjax
-from attjax import cli, errors
+from attjax import errors
+from attjax.config import arguments
 
 COMMANDS = {
     "train": "train a neural attitude controller by PPO",
@@ -26,7 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _parse(argv):
     epilog = "attjax COMMAND --help lists the flags of a command."
-    parser = cli.Parser(usage=USAGE, description=attjax.__doc__, epilog=epilog)
+    parser = arguments.Parser(usage=USAGE, description=attjax.__doc__, epilog=epilog)
     version = f"attjax {attjax.__version__}"
     parser.add_argument("--version", action="version", version=version, help="print the version")
     commands = parser.add_subparsers(

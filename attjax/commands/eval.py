@@ -8,8 +8,9 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from attjax import cli, destinations, devices, errors, run_folder
+from attjax import destinations, devices, errors, run_folder
 from attjax.commands import evaluation_output
+from attjax.config import arguments as cli
 from attjax.config import fields, toml
 from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
 

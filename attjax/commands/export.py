@@ -5,7 +5,8 @@ import contextlib
 import importlib
 from collections.abc import Sequence
 
-from attjax import c_names, cli, destinations, devices, errors, run_folder
+from attjax import c_names, destinations, devices, errors, run_folder
+from attjax.config import arguments as cli
 from attjax.config import fields
 
 FORMATS = {

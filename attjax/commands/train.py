@@ -3,7 +3,8 @@
 import argparse
 from collections.abc import Sequence
 
-from attjax import cli, devices, errors, signals
+from attjax import devices, errors, signals
+from attjax.config import arguments as cli
 from attjax.config import fields, presets, toml
 from attjax.config import run as run_config
 

@@ -1,6 +1,7 @@
 """What ``train.py`` prints of a run: what it is, how it goes, how it ended."""
 
-from attjax import cli, errors, learner
+from attjax import errors, learner
+from attjax.config import arguments
 from attjax.config.settings import Settings
 from attjax.progress import Progress
 from attjax.run import Diverged, Run
@@ -61,8 +62,8 @@ class Terminal(Observer):
         if self._stop.received is not None:
             print(f"stopped and saved at {run.agent_steps:,} agent steps; continue with --resume")
             return 128 + self._stop.received
-        folder = cli.quoted(self._folder)
-        print(f"trained; evaluate with: {cli.invocation('eval')} --checkpoint {folder}")
+        folder = arguments.quoted(self._folder)
+        print(f"trained; evaluate with: {arguments.invocation('eval')} --checkpoint {folder}")
         return 0
 
 
