@@ -9,8 +9,8 @@ import time
 import pytest
 from commands import ROOT, TINY, eval_script, export_script, run, train_script
 
-from attjax import help_text, streams
-from attjax.config import fields, presets, settings, toml
+from attjax import streams
+from attjax.config import fields, help_text, presets, settings, toml
 from attjax.config import run as run_config
 
 SCRIPTS = {"train.py": train_script, "eval.py": eval_script, "export.py": export_script}

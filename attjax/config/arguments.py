@@ -7,8 +7,8 @@ import shlex
 from pathlib import Path
 from typing import Any, NoReturn
 
-from attjax import errors, help_text
-from attjax.config import fields, settings
+from attjax import errors
+from attjax.config import fields, help_text, settings
 
 Group = argparse._ActionsContainer
 """A parser, or a group of its flags."""

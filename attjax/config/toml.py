@@ -7,8 +7,8 @@ import textwrap
 import tomllib
 from pathlib import Path
 
-from attjax import help_text, specification, streams
-from attjax.config import fields, presets, settings
+from attjax import specification, streams
+from attjax.config import fields, help_text, presets, settings
 from attjax.config.run import Config
 from attjax.errors import UserError
 from attjax.specification import Spacecraft
