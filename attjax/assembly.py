@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import assurance, learner, spacecraft, user_functions
+from attjax import assurance, learner, spacecraft
+from attjax.config import user_functions
 from attjax.config.run import Config
 from attjax.config.settings import Settings
 from attjax.env import AttitudeEnv

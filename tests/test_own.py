@@ -7,10 +7,10 @@ import jax
 import pytest
 from commands import ROOT, STEPS_PER_UPDATE, TINY, eval_script, one_line_error, run, train_script
 
-from attjax import AttitudeEnv, assembly, checkpoint, run_folder, user_functions
-from attjax.config import presets
+from attjax import AttitudeEnv, assembly, checkpoint, run_folder
+from attjax.config import presets, user_functions
+from attjax.config.user_functions import FunctionError
 from attjax.reward import logarithmic_reward
-from attjax.user_functions import FunctionError
 
 EXAMPLES = ROOT / "docs" / "examples"
 CUBESAT = str(EXAMPLES / "cubesat.toml")

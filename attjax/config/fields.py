@@ -6,7 +6,7 @@ This module imports nothing heavy, so that ``--help`` is instant.
 import dataclasses
 import math
 
-from attjax import user_functions
+from attjax.config import user_functions
 from attjax.values import plain
 
 SEED = {"low": 0, "below": 2**32}
