@@ -6,7 +6,7 @@ from flax import struct
 
 from attjax import dynamics, rigid_body
 from attjax.context import Context
-from attjax.numerics import square_root
+from attjax.dynamics.numerics import square_root
 
 
 @struct.dataclass

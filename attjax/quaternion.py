@@ -10,7 +10,7 @@ import chex
 import jax.numpy as jnp
 
 from attjax import checks
-from attjax.numerics import square_root
+from attjax.dynamics.numerics import square_root
 
 Components: TypeAlias = chex.Array | Sequence[chex.Numeric]
 """An array, or its entries one by one."""

@@ -4,7 +4,7 @@ import chex
 import jax.numpy as jnp
 
 from attjax import checks
-from attjax.numerics import square_root
+from attjax.dynamics.numerics import square_root
 
 
 def inverse(inertia: chex.Array) -> chex.Array:

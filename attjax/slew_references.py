@@ -3,10 +3,11 @@
 import chex
 import jax.numpy as jnp
 
-from attjax import numerics, rigid_body
 from attjax import quaternion as quaternions
+from attjax import rigid_body
 from attjax.context import Context
 from attjax.controllers import average_torque
+from attjax.dynamics import numerics
 from attjax.spacecraft import EnvState
 
 TABLE_5 = {

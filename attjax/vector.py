@@ -9,7 +9,8 @@ import numpy as np
 from flax import struct
 from jax.sharding import PartitionSpec
 
-from attjax import numerics, sharding
+from attjax import sharding
+from attjax.dynamics import numerics
 from attjax.sharding import AXIS, SHARED, SPLIT
 
 CPU_BLOCK = 4096

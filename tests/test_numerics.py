@@ -2,7 +2,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import numerics
+from attjax.dynamics import numerics
 
 
 def test_square_root_and_its_gradient_by_hand():
