@@ -11,8 +11,8 @@ import jax.numpy as jnp
 
 from attjax import checks, rigid_body
 from attjax import observation as observations
-from attjax import quaternion as quaternions
 from attjax.context import Context
+from attjax.dynamics import quaternion as quaternions
 
 BRAKING_MARGIN = 0.75
 """Share of the available deceleration that the braking curve counts on."""

@@ -1,7 +1,7 @@
 """The network inputs that C and ONNX know: how each of attjax.features.FEATURES is written down.
 
-All numbers are those of :mod:`attjax.features` and :mod:`attjax.quaternion`; here is only how the
-formats spell them.
+All numbers are those of :mod:`attjax.features` and :mod:`attjax.dynamics.quaternion`; here is only
+how the formats spell them.
 """
 
 from collections.abc import Callable
@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from attjax import c_text, features
-from attjax import quaternion as quaternions
 from attjax.c_text import Expression
+from attjax.dynamics import quaternion as quaternions
 from attjax.features import Multiscale
 
 

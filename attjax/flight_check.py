@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from attjax import evaluation, flight_policy, networks, slew_references
-from attjax import quaternion as quaternions
+from attjax.dynamics import quaternion as quaternions
 from attjax.flight_policy import FlightPolicy
 
 TIE = 1e-4

@@ -4,7 +4,7 @@ import chex
 import jax.numpy as jnp
 
 from attjax import checks
-from attjax import quaternion as quaternions
+from attjax.dynamics import quaternion as quaternions
 
 SIZE = 11
 QUATERNION = slice(0, 4)

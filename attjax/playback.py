@@ -9,7 +9,7 @@ import numpy as np
 
 import attjax
 from attjax import evaluation, slew_references, template
-from attjax import quaternion as quaternions
+from attjax.dynamics import quaternion as quaternions
 from attjax.env import AttitudeEnv
 from attjax.evaluation.episodes import Controller
 from attjax.spacecraft import EnvParams, EnvState

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from attjax import canvas, evaluation, slew_references
-from attjax import quaternion as quaternions
+from attjax.dynamics import quaternion as quaternions
 from attjax.env import AttitudeEnv
 from attjax.evaluation.episodes import Controller, Episodes
 from attjax.report import PAPER_TABLE_2, is_the_papers

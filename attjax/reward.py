@@ -10,7 +10,7 @@ from typing import NamedTuple
 import chex
 import jax.numpy as jnp
 
-from attjax import quaternion as quaternions
+from attjax.dynamics import quaternion as quaternions
 
 TERMINAL_BONUS = 50.0
 OVERSPEED_PENALTY = -50.0

@@ -3,11 +3,11 @@
 import chex
 import jax.numpy as jnp
 
-from attjax import quaternion as quaternions
 from attjax import rigid_body
 from attjax.context import Context
 from attjax.controllers import average_torque
 from attjax.dynamics import numerics
+from attjax.dynamics import quaternion as quaternions
 from attjax.spacecraft import EnvState
 
 TABLE_5 = {

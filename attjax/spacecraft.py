@@ -10,7 +10,7 @@ import numpy as np
 from flax import struct
 
 from attjax import checks, dynamics
-from attjax import quaternion as quaternions
+from attjax.dynamics import quaternion as quaternions
 from attjax.specification import LM50, Spacecraft
 
 

@@ -207,7 +207,8 @@ def _report(arguments, frameskip):
 
 def _in_float32(flight):
     """Terminal errors of Table 5 as eval.py flies: spacecraft and policy in float32."""
-    from attjax import evaluation, quaternion
+    from attjax import evaluation
+    from attjax.dynamics import quaternion
 
     params = flight.env.default_params
     act = jax.tree_util.Partial(flight.policy.act, flight.params)

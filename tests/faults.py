@@ -30,7 +30,7 @@ FAULTS = {
         PHYSICS,
     ),
     "missing ½ in the kinematics": (
-        "attjax/quaternion.py",
+        "attjax/dynamics/quaternion.py",
         "0.5 * (w3 * q2 - w2 * q3 + w1 * qs)", "(w3 * q2 - w2 * q3 + w1 * qs)",
         PHYSICS,
     ),

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from attjax import AttitudeEnv, controllers, evaluation, observation
-from attjax import quaternion as quaternions
+from attjax.dynamics import quaternion as quaternions
 
 ENV = AttitudeEnv(frameskip=5)
 CONTEXT = ENV.context(ENV.default_params)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from test_export import needs_compiler, random_states
 
-from attjax import assurance, export_c, export_inputs, features, quaternion
+from attjax import assurance, export_c, export_inputs, features
 from attjax.config import settings
+from attjax.dynamics import quaternion
 from attjax.features import Multiscale
 
 KINEMATICS, RATE_MASK = quaternion.derivative, assurance.rate_mask

@@ -8,7 +8,7 @@ from pages import find
 from scipy.spatial.transform import Rotation
 
 from attjax import EnvState, step
-from attjax import quaternion as quaternions
+from attjax.dynamics import quaternion as quaternions
 
 webdriver = pytest.importorskip("selenium.webdriver")
 from selenium.webdriver.common.keys import Keys  # noqa: E402

@@ -6,8 +6,8 @@ import pytest
 from matplotlib import image
 
 from attjax import AttitudeEnv, controllers, evaluation, learning_curve, plots, slew_references
-from attjax import quaternion as quaternions
 from attjax.controllers import average_torque
+from attjax.dynamics import quaternion as quaternions
 from attjax.spacecraft import EnvState
 
 ENV = AttitudeEnv(frameskip=5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from attjax import quaternion as quaternions
+from attjax.dynamics import quaternion as quaternions
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

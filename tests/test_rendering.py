@@ -5,7 +5,8 @@ import matplotlib
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, quaternion, rendering
+from attjax import AttitudeEnv, rendering
+from attjax.dynamics import quaternion
 
 PARAMS = AttitudeEnv().default_params
 HALF = rendering.WIDTH // 2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from attjax import AttitudeEnv, EnvState
-from attjax import quaternion as quaternions
+from attjax.dynamics import quaternion as quaternions
 from attjax.reward import (
     REWARDS,
     Transition,

@@ -5,7 +5,7 @@ import pytest
 
 import attjax
 from attjax import AttitudeEnv, spacecraft
-from attjax import quaternion as quaternions
+from attjax.dynamics import quaternion as quaternions
 from attjax.specification import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")

@@ -15,7 +15,8 @@ from scipy.special import ellipj, ellipk
 from test_dynamics import START, reference
 
 import attjax
-from attjax import dynamics, quaternion, spacecraft, specification
+from attjax import dynamics, spacecraft, specification
+from attjax.dynamics import quaternion
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

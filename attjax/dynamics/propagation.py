@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 
 from attjax import checks, rigid_body
-from attjax import quaternion as quaternions
+from attjax.dynamics import quaternion as quaternions
 from attjax.equations import EquationsOfMotion, RigidState, add
 from attjax.kernel import one_loop
 from attjax.specification import INTEGRATION_STEP

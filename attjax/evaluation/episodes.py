@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import quaternion as quaternions
 from attjax.context import Context
 from attjax.dynamics import numerics
+from attjax.dynamics import quaternion as quaternions
 from attjax.env import AttitudeEnv, observation_key, steps_key
 from attjax.spacecraft import EnvParams, EnvState
 from attjax.values import integer
