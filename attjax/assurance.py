@@ -4,8 +4,9 @@ import chex
 import jax.numpy as jnp
 from flax import struct
 
-from attjax import dynamics, rigid_body
+from attjax import dynamics
 from attjax.context import Context
+from attjax.dynamics import rigid_body
 from attjax.dynamics.numerics import square_root
 
 
@@ -18,7 +19,7 @@ class RateMask:
     or if gain_a < 0, or if it has no torque.
 
     Attributes:
-        form: (3, 3) A of :func:`attjax.rigid_body.peak_rate_form`, dimensionless.
+        form: (3, 3) A of :func:`attjax.dynamics.rigid_body.peak_rate_form`, dimensionless.
         impulse: (actions, 3) Δω_a, change of the rate by each action, rad/s.
         own_gain: (actions,) Δω_a·A Δω_a and a bound of what is not of first order, rad²/s².
         limit_squared: (actions,) rad²/s².
@@ -75,10 +76,10 @@ def rate_mask(context: Context, margin: float) -> RateMask:
     The square of the peak rate, P² = ω·Aω, is constant while the spacecraft coasts. A torque that
     would change the rate of a body at rest by Δω in its time d changes P² by 2 Δω·Aω + Δω·AΔω, if
     ω does not turn in the body meanwhile. As it turns by at most √½ P² a second
-    (:func:`attjax.rigid_body.peak_rate_form`) and P grows by at most p = √(Δω·AΔω), the change is
-    larger by at most √½ d p (P² + ⅔ P p + p²/6). That, for the largest P there may be, is part of
-    the own gains; the limits give it back, up to the middle between margin and limit. All this is
-    convex in the time, so no bound is passed before the torque ends.
+    (:func:`attjax.dynamics.rigid_body.peak_rate_form`) and P grows by at most p = √(Δω·AΔω), the
+    change is larger by at most √½ d p (P² + ⅔ P p + p²/6). That, for the largest P there may be,
+    is part of the own gains; the limits give it back, up to the middle between margin and limit.
+    All this is convex in the time, so no bound is passed before the torque ends.
 
     Example:
         >>> from attjax import AttitudeEnv

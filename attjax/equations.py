@@ -14,8 +14,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import rigid_body
 from attjax.dynamics import quaternion as quaternions
+from attjax.dynamics import rigid_body
 
 Tree = TypeVar("Tree")
 Vector = tuple[chex.Array, chex.Array, chex.Array]

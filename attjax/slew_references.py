@@ -3,10 +3,9 @@
 import chex
 import jax.numpy as jnp
 
-from attjax import rigid_body
 from attjax.context import Context
 from attjax.controllers import average_torque
-from attjax.dynamics import numerics
+from attjax.dynamics import numerics, rigid_body
 from attjax.dynamics import quaternion as quaternions
 from attjax.spacecraft import EnvState
 

@@ -18,7 +18,8 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from attjax import EnvState, Spacecraft, assurance, dynamics, rigid_body, spacecraft
+from attjax import EnvState, Spacecraft, assurance, dynamics, spacecraft
+from attjax.dynamics import rigid_body
 from attjax.env import AttitudeEnv
 
 MARGIN = 0.99

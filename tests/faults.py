@@ -156,7 +156,7 @@ FAULTS = {
         "0 * self.control_period, 0 * self.control_period", ["tests/test_features.py"],
     ),
     "rate mask without its second-order remainder": (
-        "attjax/rigid_body.py", "MOST_TURNING = 0.5**0.5", "MOST_TURNING = 0.0",
+        "attjax/dynamics/rigid_body.py", "MOST_TURNING = 0.5**0.5", "MOST_TURNING = 0.0",
         ["tests/test_rate_limit.py"],
     ),
     "observation bound without coasting": (

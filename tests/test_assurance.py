@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from bodies import LM50, rotated_inertia
 
-from attjax import AttitudeEnv, assurance, dynamics, rigid_body, spacecraft
+from attjax import AttitudeEnv, assurance, dynamics, spacecraft
+from attjax.dynamics import rigid_body
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

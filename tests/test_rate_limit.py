@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import rigid_body
+from attjax.dynamics import rigid_body
 
 
 @pytest.mark.parametrize("kind, form", list(zip(adversary.KINDS, itertools.cycle(adversary.FORMS))))

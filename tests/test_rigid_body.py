@@ -4,7 +4,7 @@ import pytest
 from bodies import LM50, rotated_inertia
 from scipy.integrate import solve_ivp
 
-from attjax import rigid_body
+from attjax.dynamics import rigid_body
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

@@ -13,8 +13,9 @@ import chex
 import jax
 import jax.numpy as jnp
 
-from attjax import checks, rigid_body
+from attjax import checks
 from attjax.dynamics import quaternion as quaternions
+from attjax.dynamics import rigid_body
 from attjax.equations import EquationsOfMotion, RigidState, add
 from attjax.kernel import one_loop
 from attjax.specification import INTEGRATION_STEP
