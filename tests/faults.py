@@ -21,11 +21,11 @@ RUNS = [
 ]
 FAULTS = {
     "sign of the gyroscopic term": (
-        "attjax/equations.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
+        "attjax/dynamics/equations.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
         "((i3 - i2) / i1, (i1 - i3) / i2, (i2 - i1) / i3)", PHYSICS,
     ),
     "gyroscopic term of a full tensor without its symmetric part": (
-        "attjax/equations.py",
+        "attjax/dynamics/equations.py",
         "factors = factors + factors.swapaxes(1, 2)", "factors = 2 * factors",
         PHYSICS,
     ),

@@ -12,8 +12,8 @@ from bodies import LM50, random_spacecraft, rotated_inertia
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from attjax import dynamics, equations
-from attjax.dynamics import propagation
+from attjax import dynamics
+from attjax.dynamics import equations, propagation
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

@@ -11,8 +11,8 @@ import pytest
 from bodies import LM50, random_spacecraft, rotated_inertia
 from scipy.integrate import solve_ivp
 
-from attjax import dynamics, equations
-from attjax.dynamics import propagation, quaternion
+from attjax import dynamics
+from attjax.dynamics import equations, propagation, quaternion
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 BODIES = pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])

@@ -2,8 +2,8 @@
 
 Everything here works on one spacecraft and on scalars, one a component: under ``vmap`` each
 becomes an array over the batch, which XLA vectorises several times better than arrays whose
-fastest axis has length 3 or 4. The components have their names in :mod:`attjax.equations`; any
-state is integrated whose rate the equations give.
+fastest axis has length 3 or 4. The components have their names in
+:mod:`attjax.dynamics.equations`; any state is integrated whose rate the equations give.
 """
 
 import functools
@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from attjax import checks
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
-from attjax.equations import EquationsOfMotion, RigidState, add
+from attjax.dynamics.equations import EquationsOfMotion, RigidState, add
 from attjax.kernel import one_loop
 from attjax.specification import INTEGRATION_STEP
 
