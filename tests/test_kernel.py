@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax.kernel import one_loop
+from attjax.dynamics.fused_loop import one_loop
 
 
 class Body(NamedTuple):

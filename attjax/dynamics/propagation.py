@@ -17,7 +17,7 @@ from attjax import checks
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
 from attjax.dynamics.equations import EquationsOfMotion, RigidState, add
-from attjax.kernel import one_loop
+from attjax.dynamics.fused_loop import one_loop
 from attjax.specification import INTEGRATION_STEP
 
 STEPS_IN_LINE = 20
