@@ -5,9 +5,9 @@ import jax.numpy as jnp
 from flax import struct
 
 from attjax import dynamics
-from attjax.context import Context
 from attjax.dynamics import rigid_body
 from attjax.dynamics.numerics import square_root
+from attjax.envs.context import Context
 
 
 @struct.dataclass

@@ -11,9 +11,9 @@ import jax.numpy as jnp
 
 from attjax import checks
 from attjax import observation as observations
-from attjax.context import Context
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
+from attjax.envs.context import Context
 
 BRAKING_MARGIN = 0.75
 """Share of the available deceleration that the braking curve counts on."""

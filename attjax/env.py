@@ -10,9 +10,9 @@ import numpy as np
 
 from attjax import observation as observations
 from attjax import spacecraft, spaces
-from attjax.context import Context
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
+from attjax.envs.context import Context
 from attjax.reward import Transition, paper_reward
 from attjax.spacecraft import EnvParams, EnvState
 from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft

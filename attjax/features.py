@@ -8,7 +8,7 @@ import numpy as np
 
 from attjax import checks
 from attjax import observation as observations
-from attjax.context import Context
+from attjax.envs.context import Context
 
 SCALES = tuple(4.0**n for n in range(9))
 """Factors of the multi-scale inputs: 1 resolves the slew, 65,536 the last 1e-5 of it."""

@@ -11,8 +11,8 @@ import numpy as np
 from attjax import assurance, provenance
 from attjax import observation as observations
 from attjax.assurance import RateMask
-from attjax.context import Context
 from attjax.env import AttitudeEnv
+from attjax.envs.context import Context
 from attjax.networks import Policy
 from attjax.provenance import Origin
 

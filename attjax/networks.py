@@ -11,7 +11,7 @@ from flax import struct
 
 from attjax import assurance
 from attjax import observation as observations
-from attjax.context import Context
+from attjax.envs.context import Context
 from attjax.features import FEATURES
 
 MASKED_LOGIT = -1e9

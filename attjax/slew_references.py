@@ -3,10 +3,10 @@
 import chex
 import jax.numpy as jnp
 
-from attjax.context import Context
 from attjax.controllers import average_torque
 from attjax.dynamics import numerics, rigid_body
 from attjax.dynamics import quaternion as quaternions
+from attjax.envs.context import Context
 from attjax.spacecraft import EnvState
 
 TABLE_5 = {

@@ -9,10 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax.context import Context
 from attjax.dynamics import numerics
 from attjax.dynamics import quaternion as quaternions
 from attjax.env import AttitudeEnv, observation_key, steps_key
+from attjax.envs.context import Context
 from attjax.spacecraft import EnvParams, EnvState
 from attjax.values import integer
 

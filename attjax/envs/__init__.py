@@ -1,0 +1,1 @@
+"""The slew task: the simulated spacecraft, what is observed and rewarded, many at a time."""
