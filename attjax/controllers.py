@@ -10,9 +10,9 @@ import chex
 import jax.numpy as jnp
 
 from attjax import checks
-from attjax import observation as observations
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
+from attjax.envs import observation as observations
 from attjax.envs.context import Context
 
 BRAKING_MARGIN = 0.75

@@ -8,10 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import observation as observations
 from attjax import spacecraft
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
+from attjax.envs import observation as observations
 from attjax.envs import spaces
 from attjax.envs.context import Context
 from attjax.reward import Transition, paper_reward

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from attjax import checks
-from attjax import observation as observations
+from attjax.envs import observation as observations
 from attjax.envs.context import Context
 
 SCALES = tuple(4.0**n for n in range(9))

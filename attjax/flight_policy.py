@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from attjax import assurance, provenance
-from attjax import observation as observations
 from attjax.assurance import RateMask
 from attjax.env import AttitudeEnv
+from attjax.envs import observation as observations
 from attjax.envs.context import Context
 from attjax.networks import Policy
 from attjax.provenance import Origin

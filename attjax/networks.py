@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from attjax import assurance
-from attjax import observation as observations
+from attjax.envs import observation as observations
 from attjax.envs.context import Context
 from attjax.features import FEATURES
 

@@ -5,7 +5,8 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 
-from attjax import AttitudeEnv, observation
+from attjax import AttitudeEnv
+from attjax.envs import observation
 
 BIAS = 0.01
 """Of the angular velocity about x that is told, rad/s."""

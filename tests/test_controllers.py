@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from attjax import AttitudeEnv, controllers, evaluation, observation
+from attjax import AttitudeEnv, controllers, evaluation
 from attjax.dynamics import quaternion as quaternions
+from attjax.envs import observation
 
 ENV = AttitudeEnv(frameskip=5)
 CONTEXT = ENV.context(ENV.default_params)

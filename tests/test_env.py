@@ -5,12 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import (
-    AttitudeEnv,
-    EnvState,
-    Spacecraft,
-    observation,
-)
+from attjax import AttitudeEnv, EnvState, Spacecraft
+from attjax.envs import observation
 from attjax.reward import logarithmic_reward
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")

@@ -6,7 +6,7 @@ import pytest
 import attjax
 from attjax import AttitudeEnv, EnvState, Spacecraft, evaluation, slew_references
 from attjax.dynamics import quaternion as quaternions
-from attjax.observation import ANGULAR_VELOCITY
+from attjax.envs.observation import ANGULAR_VELOCITY
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

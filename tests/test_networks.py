@@ -3,7 +3,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, observation
+from attjax import AttitudeEnv
+from attjax.envs import observation
 from attjax.networks import Inputs, Policy
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
