@@ -12,10 +12,10 @@ from attjax.config import user_functions
 from attjax.config.run import Config
 from attjax.config.settings import Settings
 from attjax.env import AttitudeEnv
+from attjax.envs.reward import REWARDS
 from attjax.errors import UserValueError
 from attjax.features import FEATURES
 from attjax.networks import Policy
-from attjax.reward import REWARDS
 from attjax.specification import LM50, Spacecraft
 
 MAX_DEVICES = 8

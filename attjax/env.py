@@ -14,7 +14,7 @@ from attjax.dynamics import rigid_body
 from attjax.envs import observation as observations
 from attjax.envs import spaces
 from attjax.envs.context import Context
-from attjax.reward import Transition, paper_reward
+from attjax.envs.reward import Transition, paper_reward
 from attjax.spacecraft import EnvParams, EnvState
 from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft
 from attjax.values import integer
@@ -34,7 +34,7 @@ class AttitudeEnv:
     Attributes:
         frameskip: RK4 steps after the first in an agent step: 20 is 11.43 Hz, 5 is 40 Hz. With
             ``params.frameskip``, the most there may be.
-        reward: function of a :class:`attjax.reward.Transition`.
+        reward: function of a :class:`attjax.envs.reward.Transition`.
         initial_state: function of a key and parameters that draws the start of an episode.
         spacecraft: what flies, and its task; ``default_params`` are its.
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from attjax import checks, programs
 from attjax.env import AttitudeEnv, steps_key
+from attjax.envs.reward import Transition
 from attjax.gymnasium_task import Options, Task, check_not_forked, outer_time_limit, random_key
 from attjax.gymnasium_vector import SlewVectorEnv
-from attjax.reward import Transition
 from attjax.spacecraft import EnvParams
 from attjax.values import integer
 
@@ -38,7 +38,7 @@ class SlewEnv(Task, gymnasium.Env):
 
     Args:
         frameskip: torque-free RK4 steps in an agent step: 20 is 11.43 Hz, 5 is 40 Hz.
-        reward: "paper", "logarithmic" or a function, as in :mod:`attjax.reward`.
+        reward: "paper", "logarithmic" or a function, as in :mod:`attjax.envs.reward`.
         env: an environment of one's own, in place of what these two describe.
         params: :class:`attjax.EnvParams` of one's own spacecraft; by default the paper's.
         render_mode: None, or "rgb_array" for pictures, which need the extra ``plot``.

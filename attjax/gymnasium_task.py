@@ -20,7 +20,7 @@ from jax._src.xla_bridge import backends_are_initialized
 
 from attjax import assurance
 from attjax.env import AttitudeEnv
-from attjax.reward import REWARDS, Transition
+from attjax.envs.reward import REWARDS, Transition
 from attjax.spacecraft import EnvParams
 
 ROUNDING = 1e-6

@@ -7,7 +7,7 @@ import numpy as np
 
 import attjax
 from attjax import AttitudeEnv, spacecraft
-from attjax.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
+from attjax.envs.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
 from attjax.specification import INTEGRATION_STEP, LM50
 
 FRAMESKIP = 20

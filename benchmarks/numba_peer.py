@@ -7,7 +7,7 @@ import numpy as np
 from batch import FLOAT, FRAMESKIP, Batch
 from single import INERTIA, SingleSlew
 
-from attjax.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
+from attjax.envs.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
 from attjax.specification import INTEGRATION_STEP
 
 STEP, HALF_STEP, SIXTH_STEP = FLOAT(INTEGRATION_STEP / np.array([1, 2, 6]))

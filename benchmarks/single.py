@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from attjax import spacecraft
-from attjax.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
+from attjax.envs.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
 from attjax.specification import LM50
 
 FRAMESKIP = 20

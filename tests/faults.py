@@ -53,7 +53,7 @@ FAULTS = {
         "torque=add(equations.torque, equations.torque)))", PHYSICS,
     ),
     "terminal reward added, not replacing": (
-        "attjax/reward.py", "jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
+        "attjax/envs/reward.py", "jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
         "reward + jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
         ["tests/test_reward.py", "tests/test_env.py"],
     ),

@@ -7,7 +7,7 @@ import pytest
 
 from attjax import AttitudeEnv, EnvState, Spacecraft
 from attjax.envs import observation
-from attjax.reward import logarithmic_reward
+from attjax.envs.reward import logarithmic_reward
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

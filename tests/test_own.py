@@ -10,7 +10,7 @@ from commands import ROOT, STEPS_PER_UPDATE, TINY, eval_script, one_line_error, 
 from attjax import AttitudeEnv, assembly, checkpoint, run_folder
 from attjax.config import presets, user_functions
 from attjax.config.user_functions import FunctionError
-from attjax.reward import logarithmic_reward
+from attjax.envs.reward import logarithmic_reward
 
 EXAMPLES = ROOT / "docs" / "examples"
 CUBESAT = str(EXAMPLES / "cubesat.toml")
@@ -146,7 +146,7 @@ def test_settings_that_do_not_fit_the_spacecraft(tmp_path, capsys):
 
 MODULE = """
 import jax.numpy as jnp
-from attjax import reward
+from attjax.envs import reward
 number = 3
 def vector(transition): return jnp.zeros(3)
 def raises(transition): return transition.speed

@@ -7,7 +7,7 @@ import pytest
 
 from attjax import AttitudeEnv, EnvState
 from attjax.dynamics import quaternion as quaternions
-from attjax.reward import (
+from attjax.envs.reward import (
     REWARDS,
     Transition,
     logarithmic_reward,

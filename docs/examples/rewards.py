@@ -2,7 +2,8 @@
 
 import jax.numpy as jnp
 
-from attjax import features, reward
+from attjax import features
+from attjax.envs import reward
 
 PRICE = 2e4
 """What an N m s costs; in the logarithmic reward, a decade of pointing earns 40 in a second."""
