@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from attjax.checkpoint import load_policy
     from attjax.env import AttitudeEnv
+    from attjax.envs.simulator import EnvParams, EnvState, step
     from attjax.evaluation import evaluate
-    from attjax.spacecraft import EnvParams, EnvState, step
     from attjax.specification import LM50, Spacecraft
     from attjax.training import train
     from attjax.vector import open_loop
@@ -28,14 +28,14 @@ __version__ = "0.1.0"
 
 _MODULES = {
     "AttitudeEnv": "attjax.env",
-    "EnvParams": "attjax.spacecraft",
-    "EnvState": "attjax.spacecraft",
+    "EnvParams": "attjax.envs.simulator",
+    "EnvState": "attjax.envs.simulator",
     "LM50": "attjax.specification",
     "Spacecraft": "attjax.specification",
     "evaluate": "attjax.evaluation",
     "load_policy": "attjax.checkpoint",
     "open_loop": "attjax.vector",
-    "step": "attjax.spacecraft",
+    "step": "attjax.envs.simulator",
     "train": "attjax.training",
 }
 

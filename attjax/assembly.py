@@ -7,11 +7,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import assurance, learner, spacecraft
+from attjax import assurance, learner
 from attjax.config import user_functions
 from attjax.config.run import Config
 from attjax.config.settings import Settings
 from attjax.env import AttitudeEnv
+from attjax.envs import simulator
 from attjax.envs.reward import REWARDS
 from attjax.errors import UserValueError
 from attjax.features import FEATURES
@@ -49,9 +50,9 @@ def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) ->
         UserValueError: the rate mask leaves no torque, even at rest.
     """
     reward = REWARDS.get(settings.task.reward) or user_functions.resolve(settings.task.reward)
-    start = spacecraft.initial_state
+    start = simulator.initial_state
     if settings.task.near_goal_share > 0:
-        start = spacecraft.NearGoalStarts(
+        start = simulator.NearGoalStarts(
             settings.task.near_goal_share, settings.task.near_goal_steps
         )
     env = AttitudeEnv(max(settings.task.frameskips), reward, start, craft)
@@ -113,7 +114,7 @@ def num_devices(settings: Settings) -> int:
     return max(n for n in range(1, shared + 1) if shared % n == 0 and n <= most)
 
 
-def env_params(setup: learner.Setup) -> spacecraft.EnvParams:
+def env_params(setup: learner.Setup) -> simulator.EnvParams:
     """The spacecraft's parameters, but for the cap on the episode's length.
 
     With several control rates, each group of spacecraft has its own.

@@ -8,14 +8,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import spacecraft
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
 from attjax.envs import observation as observations
-from attjax.envs import spaces
+from attjax.envs import simulator, spaces
 from attjax.envs.context import Context
 from attjax.envs.reward import Transition, paper_reward
-from attjax.spacecraft import EnvParams, EnvState
+from attjax.envs.simulator import EnvParams, EnvState
 from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft
 from attjax.values import integer
 
@@ -50,8 +49,8 @@ class AttitudeEnv:
 
     frameskip: int = 20
     reward: Callable[[Transition], chex.Array] = paper_reward
-    initial_state: Callable[[chex.PRNGKey, EnvParams], EnvState] = spacecraft.initial_state
-    spacecraft: Spacecraft = LM50
+    initial_state: Callable[[chex.PRNGKey, EnvParams], EnvState] = simulator.initial_state
+    simulator: Spacecraft = LM50
 
     def __post_init__(self):
         most = self.spacecraft.most_frameskip
@@ -77,7 +76,7 @@ class AttitudeEnv:
     @property
     def default_params(self) -> EnvParams:
         """The spacecraft and its task at this frameskip."""
-        return spacecraft.default_params(self.frameskip, self.spacecraft)
+        return simulator.default_params(self.frameskip, self.spacecraft)
 
     def context(self, params: EnvParams) -> Context:
         """What a controller may know of this environment."""
@@ -97,7 +96,7 @@ class AttitudeEnv:
             ValueError: a parameter is not as :class:`attjax.EnvParams` says.
         """
         params = self.default_params if params is None else params
-        spacecraft.check_params(params, self.frameskip)
+        simulator.check_params(params, self.frameskip)
         state = self.initial_state(key, params)
         return self.observe(observation_key(key), state, params), state
 
@@ -142,8 +141,8 @@ class AttitudeEnv:
             ``info["torque"]``, (3,), N m, body frame, is what acted for the context's
             ``torque_duration``.
         """
-        next_state = spacecraft.step(state, action, params, self.frameskip)
-        torque = spacecraft.applied_torque(action, params)
+        next_state = simulator.step(state, action, params, self.frameskip)
+        torque = simulator.applied_torque(action, params)
         rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2))
         terminated = rate > params.rate_limit
         truncated = ~terminated & (next_state.time >= params.max_steps_in_episode)
@@ -188,7 +187,7 @@ class AttitudeEnv:
 
         The others, practice from the middle of it, count in no metric.
         """
-        return spacecraft.starts_whole(state)
+        return simulator.starts_whole(state)
 
     def observation_space(self, params: EnvParams) -> spaces.Box:
         """Bounds of Eq. 11 up to the step that exceeds the rate limit.

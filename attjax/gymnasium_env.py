@@ -14,9 +14,9 @@ import numpy as np
 from attjax import checks, programs
 from attjax.env import AttitudeEnv, steps_key
 from attjax.envs.reward import Transition
+from attjax.envs.simulator import EnvParams
 from attjax.gymnasium_task import Options, Task, check_not_forked, outer_time_limit, random_key
 from attjax.gymnasium_vector import SlewVectorEnv
-from attjax.spacecraft import EnvParams
 from attjax.values import integer
 
 __all__ = ["ID", "SlewEnv", "SlewVectorEnv"]

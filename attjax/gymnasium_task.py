@@ -21,7 +21,7 @@ from jax._src.xla_bridge import backends_are_initialized
 from attjax import assurance
 from attjax.env import AttitudeEnv
 from attjax.envs.reward import REWARDS, Transition
-from attjax.spacecraft import EnvParams
+from attjax.envs.simulator import EnvParams
 
 ROUNDING = 1e-6
 """By how much, relatively, rounding may carry an observation beyond its bounds."""

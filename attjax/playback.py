@@ -11,8 +11,8 @@ import attjax
 from attjax import evaluation, slew_references, template
 from attjax.dynamics import quaternion as quaternions
 from attjax.env import AttitudeEnv
+from attjax.envs.simulator import EnvParams, EnvState
 from attjax.evaluation.episodes import Controller
-from attjax.spacecraft import EnvParams, EnvState
 from attjax.values import integer
 
 RANDOM_SLEWS = 4

@@ -7,7 +7,7 @@ from attjax.controllers import average_torque
 from attjax.dynamics import numerics, rigid_body
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.context import Context
-from attjax.spacecraft import EnvState
+from attjax.envs.simulator import EnvState
 
 TABLE_5 = {
     "slew1": (0.44228, 0.44228, 0.44228, 0.64279),

@@ -6,7 +6,8 @@ import jax
 import numpy as np
 
 import attjax
-from attjax import AttitudeEnv, spacecraft
+from attjax import AttitudeEnv
+from attjax.envs import simulator
 from attjax.envs.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
 from attjax.specification import INTEGRATION_STEP, LM50
 
@@ -27,7 +28,7 @@ class Batch:
     def __init__(self, num_envs: int, multiple: int = 1):
         self.size = -(-num_envs // multiple) * multiple
         self.params = ENV.default_params
-        draw = jax.jit(jax.vmap(spacecraft.initial_state, (0, None)))
+        draw = jax.jit(jax.vmap(simulator.initial_state, (0, None)))
         state = draw(jax.random.split(jax.random.key(0), self.size), self.params)
         self.quaternion = _aligned((4, self.size), FLOAT)
         self.angular_velocity = _aligned((3, self.size), FLOAT)
@@ -37,10 +38,10 @@ class Batch:
         self.ended = _aligned((self.size,), INTEGER)
         self.quaternion[:] = np.asarray(state.quaternion).T
 
-    def state(self) -> spacecraft.EnvState:
+    def state(self) -> simulator.EnvState:
         """The state as attjax has it."""
         arrays = self.quaternion.T, self.angular_velocity.T, self.time
-        return spacecraft.EnvState(*(jax.numpy.array(np.array(x)) for x in arrays))
+        return simulator.EnvState(*(jax.numpy.array(np.array(x)) for x in arrays))
 
 
 def _aligned(shape, kind):

@@ -18,9 +18,10 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from attjax import EnvState, Spacecraft, assurance, dynamics, spacecraft
+from attjax import EnvState, Spacecraft, assurance, dynamics
 from attjax.dynamics import rigid_body
 from attjax.env import AttitudeEnv
+from attjax.envs import simulator
 
 MARGIN = 0.99
 ADVERSARIES = ("random", "highest", "surprising")
@@ -78,7 +79,7 @@ def batch(kind: str, form: str, count: int, steps: int, seed: int):
     frameskips = rng.integers(least, most, count, endpoint=True)
     crafts = [random_spacecraft(rng, kind, form, frameskip, steps) for frameskip in frameskips]
     params = [
-        spacecraft.default_params(0, craft).replace(frameskip=jnp.array(frameskip, jnp.int32))
+        simulator.default_params(0, craft).replace(frameskip=jnp.array(frameskip, jnp.int32))
         for craft, frameskip in zip(crafts, frameskips)
     ]
     return AttitudeEnv(most, spacecraft=crafts[0]), jax.tree.map(lambda *x: jnp.stack(x), *params)
@@ -103,7 +104,7 @@ def _fly(env, adversary, params, keys):
             wish = functools.partial(_wish, adversary, params, env.context(params))
             mask = assurance.rate_mask(env.context(params), MARGIN)
             allowed = mask.allowed(state.angular_velocity)
-            states = jax.vmap(lambda a: spacecraft.step(state, a, params, env.frameskip))(
+            states = jax.vmap(lambda a: simulator.step(state, a, params, env.frameskip))(
                 jnp.arange(len(allowed))
             )
             peaks = rigid_body.peak_rate(states.angular_velocity, params.inertia)

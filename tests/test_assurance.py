@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from bodies import LM50, rotated_inertia
 
-from attjax import AttitudeEnv, assurance, dynamics, spacecraft
+from attjax import AttitudeEnv, assurance, dynamics
 from attjax.dynamics import rigid_body
+from attjax.envs import simulator
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -90,13 +91,11 @@ def test_no_policy_under_the_mask_passes_the_limit(frameskip, reckless):
                 state.angular_velocity, context.torque_table, context.inertia
             )
             wish = rigid_body.peak_rate(after, context.inertia) + 1e-3 * wish
-        state = spacecraft.step(
-            state, jnp.argmax(jnp.where(allowed, wish, -1.0)), params, frameskip
-        )
+        state = simulator.step(state, jnp.argmax(jnp.where(allowed, wish, -1.0)), params, frameskip)
         return state, jnp.sqrt(jnp.sum(state.angular_velocity**2))
 
     def highest_rate(key):
-        start = spacecraft.initial_state(key, params)
+        start = simulator.initial_state(key, params)
         return jnp.max(jax.lax.scan(step, start, jax.random.split(key, 1750))[1])
 
     rates = jax.jit(jax.vmap(highest_rate))(jax.random.split(jax.random.key(1), 64))

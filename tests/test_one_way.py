@@ -10,16 +10,8 @@ from own_environment import BIAS, BRAKE, Weak
 from pages import embedded
 
 import attjax
-from attjax import (
-    AttitudeEnv,
-    EnvState,
-    Spacecraft,
-    evaluation,
-    flight_check,
-    playback,
-    plots,
-    spacecraft,
-)
+from attjax import AttitudeEnv, EnvState, Spacecraft, evaluation, flight_check, playback, plots
+from attjax.envs import simulator
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -28,8 +20,8 @@ PUSH = jax.tree_util.Partial(lambda observation, context: jnp.array(7))  # 0.05 
 
 def test_all_see_the_torque_that_one_function_gives(monkeypatch):
     """Of actuators of half the strength."""
-    given = spacecraft.applied_torque
-    monkeypatch.setattr(spacecraft, "applied_torque", lambda *args: given(*args) / 2)
+    given = simulator.applied_torque
+    monkeypatch.setattr(simulator, "applied_torque", lambda *args: given(*args) / 2)
     env = AttitudeEnv(2, reward=lambda transition: transition.impulse[0])  # no other test flies it
     start = EnvState(jnp.array([0.6, 0.0, 0.0, 0.8]), jnp.zeros(3), jnp.array(0, jnp.int32))
     params = env.default_params.replace(max_steps_in_episode=jnp.array(8, jnp.int32))

@@ -8,7 +8,7 @@ from matplotlib import image
 from attjax import AttitudeEnv, controllers, evaluation, learning_curve, plots, slew_references
 from attjax.controllers import average_torque
 from attjax.dynamics import quaternion as quaternions
-from attjax.spacecraft import EnvState
+from attjax.envs.simulator import EnvState
 
 ENV = AttitudeEnv(frameskip=5)
 CONTROLLER = jax.tree_util.Partial(controllers.phase_plane)

@@ -4,17 +4,18 @@ import numpy as np
 import pytest
 
 import attjax
-from attjax import AttitudeEnv, spacecraft
+from attjax import AttitudeEnv
 from attjax.dynamics import quaternion as quaternions
+from attjax.envs import simulator
 from attjax.specification import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
 
 def states(n, seed=0):
-    params = spacecraft.default_params()
+    params = simulator.default_params()
     keys = jax.random.split(jax.random.key(seed), n)
-    return jax.vmap(spacecraft.initial_state, (0, None))(keys, params)
+    return jax.vmap(simulator.initial_state, (0, None))(keys, params)
 
 
 def test_torques_are_table_1():
@@ -53,8 +54,8 @@ def test_initial_slews_are_uniform_in_angle_and_axis():
 
 def test_near_goal_starts_cover_every_decade_of_angle_and_rate():
     n = 100_000
-    params = spacecraft.default_params()
-    starts = spacecraft.NearGoalStarts(share=0.75, steps=64)
+    params = simulator.default_params()
+    starts = simulator.NearGoalStarts(share=0.75, steps=64)
     drawn = jax.vmap(starts, (0, None))(jax.random.split(jax.random.key(0), n), params)
     near = np.asarray(drawn.time) == 500 - 64
     assert near.mean() == pytest.approx(0.75, abs=5 * np.sqrt(0.75 * 0.25 / n))
@@ -72,15 +73,15 @@ def test_near_goal_starts_cover_every_decade_of_angle_and_rate():
 
 
 def test_near_goal_starts_never_mark_a_whole_episode():
-    params = spacecraft.default_params().replace(max_steps_in_episode=jnp.int32(10))
-    starts = spacecraft.NearGoalStarts(share=0.999, steps=64)
+    params = simulator.default_params().replace(max_steps_in_episode=jnp.int32(10))
+    starts = simulator.NearGoalStarts(share=0.999, steps=64)
     times = jax.vmap(starts, (0, None))(jax.random.split(jax.random.key(0), 50), params).time
     assert set(times.tolist()) == {1}
 
 
 @pytest.mark.parametrize("frameskip, steps", [(20, 500), (5, 1750), (7, 1312), (0, 10_500)])
 def test_episodes_last_43_75_seconds(frameskip, steps):
-    assert spacecraft.default_params(frameskip).max_steps_in_episode == steps
+    assert simulator.default_params(frameskip).max_steps_in_episode == steps
 
 
 def test_step_vmapped_equals_single_steps():
@@ -131,8 +132,8 @@ def uniforms(direction):
 def test_near_goal_starts_are_made_of_independent_uniform_numbers():
     """Each quantity is uniform after its inverse distribution function, and no two are related."""
     n = 100_000
-    params = spacecraft.default_params()
-    starts = spacecraft.NearGoalStarts(share=0.5, steps=64)
+    params = simulator.default_params()
+    starts = simulator.NearGoalStarts(share=0.5, steps=64)
     drawn = jax.vmap(starts, (0, None))(jax.random.split(jax.random.key(0), n), params)
     near = np.asarray(drawn.time) > 0
     angle = np.asarray(jax.vmap(quaternions.error_angle)(drawn.quaternion))
@@ -157,16 +158,16 @@ def test_near_goal_starts_are_made_of_independent_uniform_numbers():
 def test_a_share_of_none_is_none(monkeypatch):
     """Though the number that decides may be 0."""
     monkeypatch.setattr(jax.random, "uniform", lambda key, shape, dtype: jnp.zeros(shape, dtype))
-    none = spacecraft.NearGoalStarts(share=0.0, steps=64)
-    start = none(jax.random.key(0), spacecraft.default_params())
+    none = simulator.NearGoalStarts(share=0.0, steps=64)
+    start = none(jax.random.key(0), simulator.default_params())
     assert not start.angular_velocity.any() and start.time == 0
-    assert hash(none) == hash(spacecraft.NearGoalStarts(share=0.0, steps=64))  # a static argument
+    assert hash(none) == hash(simulator.NearGoalStarts(share=0.0, steps=64))  # a static argument
 
 
 def test_an_environment_says_which_episodes_are_whole():
     """Those that start at rest, of full length; none of those that start near the goal."""
     for steps in (64, 10_000):  # longer than an episode, too
-        starts = spacecraft.NearGoalStarts(share=0.5, steps=steps)
+        starts = simulator.NearGoalStarts(share=0.5, steps=steps)
         env = AttitudeEnv(frameskip=20, initial_state=starts)
         keys = jax.random.split(jax.random.key(0), 200)
         states = jax.vmap(env.reset, (0, None))(keys, env.default_params)[1]
@@ -177,7 +178,7 @@ def test_an_environment_says_which_episodes_are_whole():
 
 def test_parameters_may_be_arguments_of_a_jitted_step():
     """All but torque_held are traced; what is left out of them is the paper's."""
-    whole = spacecraft.default_params(20)
+    whole = simulator.default_params(20)
     names = [f for f in whole.__dataclass_fields__ if f not in ("frameskip", "torque_held")]
     params = attjax.EnvParams(**{name: getattr(whole, name) for name in names})
     assert params.frameskip is None and params.torque_held is False
@@ -187,7 +188,7 @@ def test_parameters_may_be_arguments_of_a_jitted_step():
     kick = 0.5 / 240 / 0.872
     assert float(after.angular_velocity[0]) == pytest.approx(kick, rel=1e-5)
     assert float(held.angular_velocity[0]) == pytest.approx(21 * kick, rel=1e-4)
-    default = spacecraft.default_params()
+    default = simulator.default_params()
     jax.tree.map(np.testing.assert_array_equal, default, whole)
 
 
@@ -211,17 +212,17 @@ def test_parameters_may_be_arguments_of_a_jitted_step():
     ],
 )
 def test_parameters_at_the_edge_pass_and_beyond_it_are_refused(name, allowed, refused, wrong):
-    params = spacecraft.default_params()
-    spacecraft.check_params(params.replace(**{name: allowed}), 20)
+    params = simulator.default_params()
+    simulator.check_params(params.replace(**{name: allowed}), 20)
     with pytest.raises(ValueError) as error:
-        spacecraft.check_params(params.replace(**{name: refused}), 20)
+        simulator.check_params(params.replace(**{name: refused}), 20)
     assert wrong in str(error.value)
 
 
 def test_a_step_outside_jit_compiles_once(caplog):
     """And not again for other states, actions and parameters."""
     starts = [jax.tree.map(lambda x, row=row: x[row], states(3)) for row in range(3)]
-    params = spacecraft.default_params(31)
+    params = simulator.default_params(31)
     heavier = params.replace(inertia=params.inertia * 2)
 
     def compiled():

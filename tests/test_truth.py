@@ -15,8 +15,9 @@ from scipy.special import ellipj, ellipk
 from test_dynamics import START, reference
 
 import attjax
-from attjax import dynamics, spacecraft, specification
+from attjax import dynamics, specification
 from attjax.dynamics import quaternion
+from attjax.envs import simulator
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -33,7 +34,7 @@ def random_actions(frameskip, *shape):
 
 def flight(start, actions, inertia, frameskip):
     """States (1 + steps, 7) before and after each agent step."""
-    params = spacecraft.default_params(frameskip).replace(inertia=jnp.asarray(inertia, float))
+    params = simulator.default_params(frameskip).replace(inertia=jnp.asarray(inertia, float))
 
     def step(state, action):
         state = attjax.step(state, action, params, frameskip)

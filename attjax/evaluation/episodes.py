@@ -13,7 +13,7 @@ from attjax.dynamics import numerics
 from attjax.dynamics import quaternion as quaternions
 from attjax.env import AttitudeEnv, observation_key, steps_key
 from attjax.envs.context import Context
-from attjax.spacecraft import EnvParams, EnvState
+from attjax.envs.simulator import EnvParams, EnvState
 from attjax.values import integer
 
 Controller = Callable[[chex.Array, Context], chex.Array]
