@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from attjax.env import AttitudeEnv
     from attjax.envs.simulator import EnvParams, EnvState, step
     from attjax.evaluation import evaluate
-    from attjax.specification import LM50, Spacecraft
+    from attjax.spacecraft import LM50, Spacecraft
     from attjax.training import train
     from attjax.vector import open_loop
 
@@ -30,8 +30,8 @@ _MODULES = {
     "AttitudeEnv": "attjax.env",
     "EnvParams": "attjax.envs.simulator",
     "EnvState": "attjax.envs.simulator",
-    "LM50": "attjax.specification",
-    "Spacecraft": "attjax.specification",
+    "LM50": "attjax.spacecraft",
+    "Spacecraft": "attjax.spacecraft",
     "evaluate": "attjax.evaluation",
     "load_policy": "attjax.checkpoint",
     "open_loop": "attjax.vector",

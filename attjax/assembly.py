@@ -17,7 +17,7 @@ from attjax.envs.reward import REWARDS
 from attjax.errors import UserValueError
 from attjax.features import FEATURES
 from attjax.networks import Policy
-from attjax.specification import LM50, Spacecraft
+from attjax.spacecraft import LM50, Spacecraft
 
 MAX_DEVICES = 8
 """Most devices of a run, a power of two as their number is."""

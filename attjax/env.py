@@ -15,7 +15,7 @@ from attjax.envs import simulator, spaces
 from attjax.envs.context import Context
 from attjax.envs.reward import Transition, paper_reward
 from attjax.envs.simulator import EnvParams, EnvState
-from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft
+from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
 from attjax.values import integer
 
 _OBSERVATION, _STEPS = np.uint32(2**32 - 1), np.uint32(2**32 - 2)

@@ -5,7 +5,7 @@ import dataclasses
 import attjax
 from attjax.config import presets
 from attjax.config.run import Config
-from attjax.specification import INTEGRATION_STEP, LM50, Spacecraft
+from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
 
 
 @dataclasses.dataclass(frozen=True)

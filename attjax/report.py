@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from attjax.evaluation.episodes import STATISTICS
-from attjax.specification import LM50, Spacecraft
+from attjax.spacecraft import LM50, Spacecraft
 
 PAPER_TABLE_2 = {
     ("closest", "error_deg"): (

@@ -13,7 +13,7 @@ import re
 import uuid
 from pathlib import Path
 
-from attjax import belongings, specification
+from attjax import belongings, spacecraft
 from attjax.config import settings
 from attjax.config.run import Config
 from attjax.errors import UserError, warning_line
@@ -180,7 +180,7 @@ def read_config(folder: Path) -> Config:
             str(content["preset"]),
             int(content["seed"]),
             settings.from_json(content["settings"]),
-            specification.from_lists(content["spacecraft"]),
+            spacecraft.from_lists(content["spacecraft"]),
         )
     except (ValueError, KeyError, TypeError, OverflowError) as error:
         raise FolderError(f"{path} cannot be read: {error!r}") from None

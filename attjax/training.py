@@ -9,7 +9,7 @@ from attjax.config import run as run_config
 from attjax.config.settings import Settings
 from attjax.keeper import Keeper, Place
 from attjax.run import Diverged, Run
-from attjax.specification import Spacecraft
+from attjax.spacecraft import Spacecraft
 
 
 class Observer:

@@ -5,7 +5,7 @@ from Basilisk.simulation import extForceTorque, spacecraft
 from Basilisk.utilities import SimulationBaseClass, macros
 from single import FRAMESKIP, INERTIA, SingleSlew
 
-from attjax.specification import INTEGRATION_STEP
+from attjax.spacecraft import INTEGRATION_STEP
 
 MASS = 100.0
 """kg; no force acts, so that any will do."""

@@ -9,7 +9,7 @@ import attjax
 from attjax import AttitudeEnv
 from attjax.envs import simulator
 from attjax.envs.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
-from attjax.specification import INTEGRATION_STEP, LM50
+from attjax.spacecraft import INTEGRATION_STEP, LM50
 
 FRAMESKIP = 20
 TOLERANCE = 1e-5

@@ -8,7 +8,7 @@ from batch import FLOAT, FRAMESKIP, Batch
 from single import INERTIA, SingleSlew
 
 from attjax.envs.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
-from attjax.specification import INTEGRATION_STEP
+from attjax.spacecraft import INTEGRATION_STEP
 
 STEP, HALF_STEP, SIXTH_STEP = FLOAT(INTEGRATION_STEP / np.array([1, 2, 6]))
 ZERO, HALF, ONE, TWO, NINE = FLOAT([0, 0.5, 1, 2, 9])

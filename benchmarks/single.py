@@ -6,7 +6,7 @@ import numpy as np
 
 from attjax.envs import simulator
 from attjax.envs.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
-from attjax.specification import LM50
+from attjax.spacecraft import LM50
 
 FRAMESKIP = 20
 INERTIA = np.array(LM50.inertia)

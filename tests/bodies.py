@@ -4,9 +4,9 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from attjax import specification
+from attjax import spacecraft
 
-LM50 = np.array(specification.LM50.inertia)
+LM50 = np.array(spacecraft.LM50.inertia)
 
 
 def rotated_inertia():

@@ -32,7 +32,7 @@ from attjax import (
 from attjax.flight_check import Decisions
 from attjax.flight_policy import FlightPolicy
 from attjax.networks import Policy
-from attjax.specification import LM50
+from attjax.spacecraft import LM50
 
 SLEWS = 400
 STRICT = ("-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror")

@@ -9,7 +9,7 @@ from attjax import run_folder
 from attjax.config import presets, toml
 from attjax.config import run as run_config
 from attjax.errors import UserError
-from attjax.specification import LM50
+from attjax.spacecraft import LM50
 
 
 @pytest.mark.parametrize("preset", presets.PRESETS)

@@ -13,7 +13,7 @@ from commands import ROOT, export_script, one_line_error
 
 from attjax import export_c, flight_check
 from attjax.flight_policy import FlightPolicy
-from attjax.specification import Spacecraft
+from attjax.spacecraft import Spacecraft
 
 PRECISE = ROOT / "pretrained" / "precise"
 STATES = 20_000

@@ -8,7 +8,7 @@ import pytest
 from commands import ROOT, export_script, one_line_error
 
 from attjax import export_c, flight_check
-from attjax.specification import Spacecraft
+from attjax.spacecraft import Spacecraft
 
 PRECISE = ROOT / "pretrained" / "precise"
 RATES = {"fast": 5, "slow_11hz": 20}

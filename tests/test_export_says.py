@@ -16,7 +16,7 @@ from commands import ROOT, eval_script, export_script
 
 from attjax import AttitudeEnv, export_c, flight_check, flight_policy
 from attjax.flight_policy import FlightPolicy
-from attjax.specification import Spacecraft
+from attjax.spacecraft import Spacecraft
 
 PRECISE = ROOT / "pretrained" / "precise"
 needs_compiler = pytest.mark.skipif(exported.compiler() is None, reason="there is no C compiler")

@@ -11,7 +11,7 @@ import attjax
 from attjax import AttitudeEnv, controllers, evaluation
 from attjax.config import presets
 from attjax.config import run as run_config
-from attjax.specification import LM50
+from attjax.spacecraft import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

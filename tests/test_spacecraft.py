@@ -7,7 +7,7 @@ import attjax
 from attjax import AttitudeEnv
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs import simulator
-from attjax.specification import LM50
+from attjax.spacecraft import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

@@ -15,20 +15,20 @@ from scipy.special import ellipj, ellipk
 from test_dynamics import START, reference
 
 import attjax
-from attjax import dynamics, specification
+from attjax import dynamics, spacecraft
 from attjax.dynamics import quaternion
 from attjax.envs import simulator
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
-TORQUE_TABLE = np.array(specification.LM50.torque_table)
+TORQUE_TABLE = np.array(spacecraft.LM50.torque_table)
 BODIES = (LM50, rotated_inertia())
 BOTH_BODIES = pytest.mark.parametrize("inertia", BODIES, ids=["diagonal", "full"])
 
 
 def random_actions(frameskip, *shape):
     """Actions of whole episodes, (steps, *shape)."""
-    steps = specification.LM50.max_steps(frameskip)
+    steps = spacecraft.LM50.max_steps(frameskip)
     return np.random.default_rng(1).integers(0, len(TORQUE_TABLE), (steps, *shape))
 
 

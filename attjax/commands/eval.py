@@ -12,7 +12,7 @@ from attjax import destinations, devices, errors, run_folder
 from attjax.commands import evaluation_output
 from attjax.config import arguments as cli
 from attjax.config import fields, toml
-from attjax.specification import INTEGRATION_STEP, LM50, MOST_DURATION
+from attjax.spacecraft import INTEGRATION_STEP, LM50, MOST_DURATION
 
 POLICY = "policy"
 STDOUT = Path("-")

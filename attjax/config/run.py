@@ -6,7 +6,7 @@ import operator
 from attjax.config.presets import PRECISE, PRESETS
 from attjax.config.settings import Settings
 from attjax.errors import UserError
-from attjax.specification import LM50, Spacecraft
+from attjax.spacecraft import LM50, Spacecraft
 
 DEFAULT_PRESET = "precise"
 CUSTOM = "custom"

@@ -7,11 +7,12 @@ import textwrap
 import tomllib
 from pathlib import Path
 
-from attjax import specification, streams
+from attjax import spacecraft as specification
+from attjax import streams
 from attjax.config import fields, help_text, presets, settings
 from attjax.config.run import Config
 from attjax.errors import UserError
-from attjax.specification import Spacecraft
+from attjax.spacecraft import Spacecraft
 
 SETTINGS = settings.FIELDS
 OTHERS = (

@@ -18,7 +18,7 @@ from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
 from attjax.dynamics.equations import EquationsOfMotion, RigidState, add
 from attjax.dynamics.fused_loop import one_loop
-from attjax.specification import INTEGRATION_STEP
+from attjax.spacecraft import INTEGRATION_STEP
 
 STEPS_IN_LINE = 20
 """Torque-free RK4 steps compiled for CPU one after another before there is a loop over them."""

@@ -4,7 +4,7 @@ import chex
 import jax.numpy as jnp
 from flax import struct
 
-from attjax.specification import INTEGRATION_STEP
+from attjax.spacecraft import INTEGRATION_STEP
 
 
 @struct.dataclass

@@ -11,7 +11,7 @@ from flax import struct
 
 from attjax import checks, dynamics
 from attjax.dynamics import quaternion as quaternions
-from attjax.specification import LM50, Spacecraft
+from attjax.spacecraft import LM50, Spacecraft
 
 
 @struct.dataclass
