@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from attjax.checkpoint import load_policy
-    from attjax.env import AttitudeEnv
+    from attjax.envs.attitude import AttitudeEnv
     from attjax.envs.simulator import EnvParams, EnvState, step
     from attjax.evaluation import evaluate
     from attjax.spacecraft import LM50, Spacecraft
@@ -27,7 +27,7 @@ __all__ = [
 __version__ = "0.1.0"
 
 _MODULES = {
-    "AttitudeEnv": "attjax.env",
+    "AttitudeEnv": "attjax.envs.attitude",
     "EnvParams": "attjax.envs.simulator",
     "EnvState": "attjax.envs.simulator",
     "LM50": "attjax.spacecraft",

@@ -10,8 +10,8 @@ import numpy as np
 
 from attjax import assurance, provenance
 from attjax.assurance import RateMask
-from attjax.env import AttitudeEnv
 from attjax.envs import observation as observations
+from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
 from attjax.networks import Policy
 from attjax.provenance import Origin

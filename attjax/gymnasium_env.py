@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 
 from attjax import checks, programs
-from attjax.env import AttitudeEnv, steps_key
+from attjax.envs.attitude import AttitudeEnv, steps_key
 from attjax.envs.reward import Transition
 from attjax.envs.simulator import EnvParams
 from attjax.gymnasium_task import Options, Task, check_not_forked, outer_time_limit, random_key

@@ -19,7 +19,7 @@ from gymnasium.wrappers import TimeLimit
 from jax._src.xla_bridge import backends_are_initialized
 
 from attjax import assurance
-from attjax.env import AttitudeEnv
+from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.reward import REWARDS, Transition
 from attjax.envs.simulator import EnvParams
 

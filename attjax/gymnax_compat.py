@@ -11,7 +11,7 @@ import functools
 import jax
 from gymnax.environments import environment, spaces
 
-from attjax.env import AttitudeEnv
+from attjax.envs.attitude import AttitudeEnv
 
 
 class GymnaxEnv(environment.Environment):

@@ -10,7 +10,7 @@ import numpy as np
 import attjax
 from attjax import evaluation, slew_references, template
 from attjax.dynamics import quaternion as quaternions
-from attjax.env import AttitudeEnv
+from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.simulator import EnvParams, EnvState
 from attjax.evaluation.episodes import Controller
 from attjax.values import integer

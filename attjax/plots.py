@@ -10,7 +10,7 @@ import numpy as np
 
 from attjax import canvas, evaluation, slew_references
 from attjax.dynamics import quaternion as quaternions
-from attjax.env import AttitudeEnv
+from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.simulator import EnvParams, EnvState
 from attjax.evaluation.episodes import Controller, Episodes
 from attjax.report import PAPER_TABLE_2, is_the_papers

@@ -9,7 +9,7 @@ import numpy as np
 from attjax import assembly, learner, metrics, metrics_file, nan_search, ppo
 from attjax.config.fields import frameskip_to_judge
 from attjax.config.run import Config
-from attjax.env import AttitudeEnv
+from attjax.envs.attitude import AttitudeEnv
 from attjax.learner import Learner, Setup
 
 

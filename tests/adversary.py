@@ -20,8 +20,8 @@ from scipy.spatial.transform import Rotation
 
 from attjax import EnvState, Spacecraft, assurance, dynamics
 from attjax.dynamics import rigid_body
-from attjax.env import AttitudeEnv
 from attjax.envs import simulator
+from attjax.envs.attitude import AttitudeEnv
 
 MARGIN = 0.99
 ADVERSARIES = ("random", "highest", "surprising")

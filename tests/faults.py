@@ -58,7 +58,7 @@ FAULTS = {
         ["tests/test_reward.py", "tests/test_env.py"],
     ),
     "time limit before overspeed": (
-        "attjax/env.py",
+        "attjax/envs/attitude.py",
         "truncated = ~terminated & (next_state.time", "truncated = (next_state.time",
         ["tests/test_env.py"],
     ),
@@ -87,7 +87,7 @@ FAULTS = {
         "random = (0 * uniform + uniform[0], jax.random.split(flight_key, (length, 2)))", LEARNING,
     ),
     "reset state cached": (
-        "attjax/env.py", "fresh_observation, fresh_state = self.reset_env(key, params)",
+        "attjax/envs/attitude.py", "fresh_observation, fresh_state = self.reset_env(key, params)",
         "fresh_observation, fresh_state = self.reset_env(jax.random.key(0), params)",
         ["tests/test_env.py"],
     ),
@@ -114,7 +114,7 @@ FAULTS = {
         "context.torque_duration", "(1 / 240)", ["tests/test_evaluation.py"],
     ),
     "impulse of a held torque is that of a pulse, for a reward": (
-        "attjax/env.py", "self.context(params).torque_duration,", "INTEGRATION_STEP,",
+        "attjax/envs/attitude.py", "self.context(params).torque_duration,", "INTEGRATION_STEP,",
         ["tests/test_env.py"],
     ),
     "sign in TABLE_5": (
@@ -160,7 +160,7 @@ FAULTS = {
         ["tests/test_rate_limit.py"],
     ),
     "observation bound without coasting": (
-        "attjax/env.py",
+        "attjax/envs/attitude.py",
         "(params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))",
         "(params.rate_limit + kick)", ["tests/test_observation_space.py"],
     ),

@@ -112,7 +112,7 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file):
     """Fly, draw, write and print."""
     # Imported late: with them, --help and errors in the arguments would take seconds.
     from attjax import evaluation, report
-    from attjax.env import AttitudeEnv
+    from attjax.envs.attitude import AttitudeEnv
 
     env = AttitudeEnv(arguments.frameskip, spacecraft=spacecraft)
     params, seed, episodes = env.default_params, arguments.seed or 0, arguments.episodes

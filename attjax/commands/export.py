@@ -95,7 +95,7 @@ def _module(name):
 def _flight_policy(arguments):
     # Imported late: with them, --help and errors in the arguments would take seconds.
     from attjax import checkpoint, provenance
-    from attjax.env import AttitudeEnv
+    from attjax.envs.attitude import AttitudeEnv
     from attjax.flight_policy import FlightPolicy
 
     folder = arguments.checkpoint

@@ -11,7 +11,7 @@ from flax import struct
 
 from attjax.dynamics import numerics
 from attjax.dynamics import quaternion as quaternions
-from attjax.env import AttitudeEnv, observation_key, steps_key
+from attjax.envs.attitude import AttitudeEnv, observation_key, steps_key
 from attjax.envs.context import Context
 from attjax.envs.simulator import EnvParams, EnvState
 from attjax.values import integer
