@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from attjax.checkpoint import load_policy
     from attjax.envs.attitude import AttitudeEnv
+    from attjax.envs.batch import open_loop
     from attjax.envs.simulator import EnvParams, EnvState, step
     from attjax.evaluation import evaluate
     from attjax.spacecraft import LM50, Spacecraft
     from attjax.training import train
-    from attjax.vector import open_loop
 
 __all__ = [
     "LM50",
@@ -34,7 +34,7 @@ _MODULES = {
     "Spacecraft": "attjax.spacecraft",
     "evaluate": "attjax.evaluation",
     "load_policy": "attjax.checkpoint",
-    "open_loop": "attjax.vector",
+    "open_loop": "attjax.envs.batch",
     "step": "attjax.envs.simulator",
     "train": "attjax.training",
 }

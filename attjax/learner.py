@@ -14,8 +14,8 @@ import optax
 from flax import struct
 
 from attjax import sharding
-from attjax import vector as batch
 from attjax.config.settings import PPO, Settings
+from attjax.envs import batch
 from attjax.networks import Policy
 from attjax.sharding import SHARED, SPLIT
 

@@ -9,7 +9,8 @@ import functools
 import jax
 import jax.numpy as jnp
 
-from attjax import sharding, vector
+from attjax import sharding
+from attjax.envs import batch
 
 
 @functools.partial(jax.jit, static_argnames="env")
@@ -66,7 +67,7 @@ def step_batch(env, params, key, states, actions):
         the spacecraft there, observations, rewards, terminated, truncated.
     """
     key, step_key = jax.random.split(key)
-    observations, states, rewards, terminated, truncated, info = vector.step(
+    observations, states, rewards, terminated, truncated, info = batch.step(
         env, params, step_key, states, actions
     )
     final = _single(info["final_observation"]), _described(info)
@@ -95,7 +96,7 @@ def step_batch_later_reset(env, params, key, states, actions, ended):
     observations, states, *results, info = jax.vmap(env.step_env, (0, 0, 0, None))(
         step_keys, states, actions, params
     )
-    observations, states = vector.restart(
+    observations, states = batch.restart(
         lambda key, _: env.reset(key, params), reset_key, ended, (observations, states)
     )
     results = [jnp.where(ended, jnp.zeros_like(x), x) for x in (*results, info["truncated"])]

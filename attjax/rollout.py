@@ -9,7 +9,7 @@ import numpy as np
 from flax import struct
 
 from attjax import losses, sharding
-from attjax import vector as batch
+from attjax.envs import batch
 from attjax.learner import Learner, Setup
 from attjax.networks import Inputs, Policy
 

@@ -9,7 +9,8 @@ from common import Flight
 from jax.sharding import NamedSharding, PartitionSpec
 
 import attjax
-from attjax import AttitudeEnv, sharding, vector
+from attjax import AttitudeEnv, sharding
+from attjax.envs import batch
 
 FRAMESKIP = 20
 ENV = AttitudeEnv(FRAMESKIP)
@@ -24,12 +25,12 @@ def steps_a_call(num_envs: int) -> int:
 
 
 def fused(num_envs: int, num_devices: int = 1) -> Flight:
-    """The whole agent step of a batch, ``attjax.vector.open_loop``."""
+    """The whole agent step of a batch, ``attjax.envs.batch.open_loop``."""
     key, states, actions = _start(num_envs)
     mesh = sharding.mesh(num_devices)
     states = jax.device_put(states, NamedSharding(mesh, PartitionSpec(sharding.AXIS)))
     actions = jax.device_put(actions, NamedSharding(mesh, PartitionSpec(None, sharding.AXIS)))
-    lower = functools.partial(vector.open_loop.lower, num_devices=num_devices)
+    lower = functools.partial(batch.open_loop.lower, num_devices=num_devices)
     return _flight(lower, (ENV,), (ENV.default_params, key), states, actions)
 
 

@@ -92,7 +92,8 @@ FAULTS = {
         ["tests/test_env.py"],
     ),
     "reset state cached in the fused rollout": (
-        "attjax/vector.py", "fresh = jax.vmap(reset)(jax.random.split(fresh_key, portion), rows)",
+        "attjax/envs/batch.py",
+        "fresh = jax.vmap(reset)(jax.random.split(fresh_key, portion), rows)",
         "fresh = jax.vmap(reset)(jax.random.split(jax.random.key(0), portion), rows)", LEARNING,
     ),
     "devices draw the same numbers": (

@@ -5,16 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import (
-    AttitudeEnv,
-    EnvState,
-    Spacecraft,
-    checks,
-    controllers,
-    dynamics,
-    step,
-    vector,
-)
+from attjax import AttitudeEnv, EnvState, Spacecraft, checks, controllers, dynamics, step
+from attjax.envs import batch
 from attjax.networks import Policy
 
 ENV = AttitudeEnv(frameskip=5)
@@ -117,7 +109,7 @@ def test_batches_of_the_fused_rollout():
         (np.zeros((3, 4), int), 0, "num_devices is 0"),
     ):
         arguments = ENV, PARAMS, jax.random.key(1), states, actions, devices
-        assert expected in message(vector.open_loop, *arguments)
+        assert expected in message(batch.open_loop, *arguments)
 
 
 def test_bodies_at_the_edge_of_what_is_possible_are_accepted():

@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, vector
+from attjax import AttitudeEnv
+from attjax.envs import batch
 
 ENV = AttitudeEnv(frameskip=5)
 
@@ -26,7 +27,7 @@ def test_restart_replaces_all_that_ended_and_nothing_else(ended_count):
         return {"row": row, "number": jax.random.uniform(key)}
 
     ongoing = {"row": jnp.full(40, -1), "number": jnp.full(40, 2.0)}
-    after = jax.jit(vector.restart, static_argnums=0)(reset, jax.random.key(2), ended, ongoing)
+    after = jax.jit(batch.restart, static_argnums=0)(reset, jax.random.key(2), ended, ongoing)
     np.testing.assert_array_equal(after["row"], jnp.where(ended, jnp.arange(40), -1))
     np.testing.assert_array_equal(after["number"] == 2.0, ~ended)
     assert len(np.unique(after["number"][ended])) == ended_count
@@ -36,7 +37,7 @@ def test_step_is_the_environment_s_own_but_for_the_fresh_episodes():
     params, states = fleet(64, max_steps=3)
     states = states.replace(time=jnp.arange(64) % 3)
     actions = jax.random.randint(jax.random.key(3), (64,), 0, 19)
-    ours = vector.step(ENV, params, jax.random.key(4), states, actions)
+    ours = batch.step(ENV, params, jax.random.key(4), states, actions)
     keys = jax.random.split(jax.random.key(5), 64)
     expected = jax.vmap(ENV.step, (0, 0, 0, None))(keys, states, actions, params)
     ended = np.asarray(states.time == 2)
@@ -55,11 +56,11 @@ def test_open_loop_sums_what_single_steps_give(num_devices):
     params, states = fleet(32)
     actions = jax.random.randint(jax.random.key(3), (20, 32), 0, 19)
     expected, reward = states, 0.0
-    step = jax.jit(vector.step, static_argnums=0)
+    step = jax.jit(batch.step, static_argnums=0)
     for action in actions:
         _, expected, r, _, _, _ = step(ENV, params, jax.random.key(0), expected, action)
         reward += r
-    final, observation, totals = vector.open_loop(
+    final, observation, totals = batch.open_loop(
         ENV, params, jax.random.key(4), states, actions, num_devices=num_devices
     )
     np.testing.assert_allclose(final.quaternion, expected.quaternion, atol=1e-5)
@@ -71,6 +72,6 @@ def test_open_loop_sums_what_single_steps_give(num_devices):
 def test_open_loop_restarts_and_counts_episodes():
     params, states = fleet(32, max_steps=4)
     actions = jnp.zeros((10, 32), int)
-    final, _, totals = vector.open_loop(ENV, params, jax.random.key(4), states, actions)
+    final, _, totals = batch.open_loop(ENV, params, jax.random.key(4), states, actions)
     assert set(np.asarray(totals.episodes)) == {2}
     assert set(np.asarray(final.time)) == {2}

@@ -11,9 +11,9 @@ import jax
 import jax.numpy as jnp
 
 from attjax import losses, sharding
-from attjax import vector as batch
 from attjax.config.settings import PPO
 from attjax.descent import Sample, optimize
+from attjax.envs import batch
 from attjax.learner import LEARNER_SPECS, Learner, Setup
 from attjax.rollout import Step, encode, episode_sums, rollout
 from attjax.sharding import AXIS, SHARED
