@@ -3,7 +3,7 @@
 import chex
 import jax.numpy as jnp
 
-from attjax.controllers import average_torque
+from attjax.control.classical import average_torque
 from attjax.dynamics import numerics, rigid_body
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.context import Context

@@ -9,13 +9,14 @@ import jax
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, controllers
+from attjax import AttitudeEnv
+from attjax.control import classical
 
 ENV = AttitudeEnv(frameskip=20)
 HOSTILE = "</script><script>alert(1)</script><!--\"'&$style"
 CONTROLLERS = {
-    "phase-plane": jax.tree_util.Partial(controllers.phase_plane),
-    "feedback": jax.tree_util.Partial(controllers.quaternion_feedback),
+    "phase-plane": jax.tree_util.Partial(classical.phase_plane),
+    "feedback": jax.tree_util.Partial(classical.quaternion_feedback),
 }
 FLAGS = (
     "headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run",

@@ -8,8 +8,9 @@ import pytest
 from commands import STEPS_PER_UPDATE, TINY, eval_script, run
 
 import attjax
-from attjax import LM50, AttitudeEnv, Spacecraft, checkpoint, controllers
+from attjax import LM50, AttitudeEnv, Spacecraft, checkpoint
 from attjax.config.presets import PAPER_FAST
+from attjax.control import classical
 from attjax.errors import UserError
 from attjax.keeper import Place
 from attjax.run import Diverged
@@ -119,7 +120,7 @@ def test_evaluate_is_what_eval_py_writes(tmp_path):
     arguments = ["--controller=phase-plane", "--episodes=20", "--frameskip=20", "--seed=4"]
     assert eval_script.main([*arguments, "--device=cpu", "--json", str(path)]) == 0
     env = AttitudeEnv(frameskip=20)
-    ours = attjax.evaluate(controllers.phase_plane, env, episodes=20, seed=4)
+    ours = attjax.evaluate(classical.phase_plane, env, episodes=20, seed=4)
     assert {"controller": "phase-plane"} | ours == json.loads(path.read_text())
 
 

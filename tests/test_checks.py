@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, EnvState, Spacecraft, checks, controllers, dynamics, step
+from attjax import AttitudeEnv, EnvState, Spacecraft, checks, dynamics, step
+from attjax.control import classical
 from attjax.envs import batch
 from attjax.networks import Policy
 
@@ -95,7 +96,7 @@ def test_observations_of_controllers_and_policies():
     params = policy.init(jax.random.key(0), jax.random.key(1), jnp.zeros(11), context)
     expected = "observation has shape (7,); it must be (11,)"
     assert expected in message(policy.act, params, short, context)
-    for controller in controllers.CONTROLLERS.values():
+    for controller in classical.CONTROLLERS.values():
         assert expected in message(controller, short, context)
 
 

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from commands import ROOT, STEPS_PER_UPDATE, TINY, eval_script, one_line_error, run, train_script
 
-from attjax import checkpoint, controllers, evaluation, learner, run_folder
+from attjax import checkpoint, evaluation, learner, run_folder
+from attjax.control import classical
 
 
 def metrics(folder):
@@ -81,7 +82,7 @@ def test_comparison_flies_the_same_slews(trained, tmp_path):
     assert header.split() == ["policy", "phase-plane", "feedback", "paper"]
     results = json.loads(path.read_text())["controllers"]
     assert [r["controller"] for r in results] == ["policy", *eval_script.CLASSICAL]
-    assert set(controllers.CONTROLLERS) == set(eval_script.CLASSICAL)
+    assert set(classical.CONTROLLERS) == set(eval_script.CLASSICAL)
     assert len({(r["seed"], r["episodes"], r["duration_s"]) for r in results}) == 1
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from attjax import AttitudeEnv, controllers, evaluation
+from attjax import AttitudeEnv, evaluation
+from attjax.control import classical
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs import observation
 
@@ -26,7 +27,7 @@ def test_rotation_vector_agrees_with_scipy():
     assert not quaternions.rotation_vector(jnp.array([0.0, 0, 0, 1])).any()
 
 
-@pytest.mark.parametrize("controller", controllers.CONTROLLERS.values())
+@pytest.mark.parametrize("controller", classical.CONTROLLERS.values())
 def test_controllers_coast_at_the_goal_and_turn_towards_it(controller):
     assert act(controller, [0, 0, 0, 1], [0, 0, 0]) == 0
     for axis in range(3):
@@ -37,7 +38,7 @@ def test_controllers_coast_at_the_goal_and_turn_towards_it(controller):
             np.testing.assert_array_equal(np.sign(torque), -sign * np.eye(3)[axis])
 
 
-@pytest.mark.parametrize("controller", controllers.CONTROLLERS.values())
+@pytest.mark.parametrize("controller", classical.CONTROLLERS.values())
 def test_controllers_take_the_shorter_way(controller):
     """q and −q are the same attitude."""
     rng = np.random.default_rng(1)
@@ -57,7 +58,7 @@ def test_nearest_action_by_brute_force():
             wanted *= 0.45 / np.linalg.norm(wanted)
         distances = [np.linalg.norm(inertia * (wanted - rate) - row / 240) for row in table]
         observed = observation.observe(jnp.array([0.0, 0, 0, 1]), jnp.array(rate))
-        ours = controllers.nearest_action(jnp.array(wanted), observed, CONTEXT)
+        ours = classical.nearest_action(jnp.array(wanted), observed, CONTEXT)
         assert distances[int(ours)] == pytest.approx(min(distances), rel=1e-4)
 
 
@@ -68,7 +69,7 @@ def test_full_inertia_gives_the_same_actions_as_its_diagonal():
         quaternion = rng.normal(size=4)
         quaternion /= np.linalg.norm(quaternion)
         rate = 0.1 * rng.normal(size=3)
-        for controller in controllers.CONTROLLERS.values():
+        for controller in classical.CONTROLLERS.values():
             assert act(controller, quaternion, rate) == act(controller, quaternion, rate, full)
 
 
@@ -85,16 +86,16 @@ def test_feedback_does_not_depend_on_the_axes_that_it_is_written_in(x64):
         quaternion = rng.normal(size=4)
         quaternion /= np.linalg.norm(quaternion)
         rate = 0.1 * rng.normal(size=3)
-        expected = act(controllers.quaternion_feedback, quaternion, rate, context)
+        expected = act(classical.quaternion_feedback, quaternion, rate, context)
         state = [*(turn @ quaternion[:3]), quaternion[3]], turn @ rate
-        assert act(controllers.quaternion_feedback, *state, turned) == expected
+        assert act(classical.quaternion_feedback, *state, turned) == expected
 
 
 @pytest.mark.parametrize(
     "name, error_deg, settling_s", [("phase-plane", 5e-4, 9.0), ("feedback", 0.02, 25.0)]
 )
 def test_controllers_fly_every_slew(name, error_deg, settling_s):
-    controller = jax.tree_util.Partial(controllers.CONTROLLERS[name])
+    controller = jax.tree_util.Partial(classical.CONTROLLERS[name])
     flown = evaluation.fly(controller, ENV, ENV.default_params, jax.random.key(1), 500)
     result = evaluation.statistics(flown, ENV, ENV.default_params)
     assert result["success_rate"] == 1 and result["overspeed_rate"] == 0

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import attjax
-from attjax import AttitudeEnv, controllers, evaluation
+from attjax import AttitudeEnv, evaluation
 from attjax.config import presets
 from attjax.config import run as run_config
+from attjax.control import classical
 from attjax.spacecraft import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
@@ -33,7 +34,7 @@ def test_integers_are_integers_whoever_made_them(integer):
 def test_evaluation_flies_numpys_numbers_of_episodes():
     env = AttitudeEnv(20)
     params = env.default_params.replace(max_steps_in_episode=jnp.int32(3))
-    controller = jax.tree_util.Partial(controllers.phase_plane)
+    controller = jax.tree_util.Partial(classical.phase_plane)
     flown = evaluation.fly(controller, env, params, jax.random.key(0), np.int64(2))
     assert flown.score.shape == (2,)
     with pytest.raises(ValueError, match=r"episodes is 2\.5; it must be an integer at least 1"):

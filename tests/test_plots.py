@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 from matplotlib import image
 
-from attjax import AttitudeEnv, controllers, evaluation, learning_curve, plots, slew_references
-from attjax.controllers import average_torque
+from attjax import AttitudeEnv, evaluation, learning_curve, plots, slew_references
+from attjax.control import classical
+from attjax.control.classical import average_torque
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.simulator import EnvState
 
 ENV = AttitudeEnv(frameskip=5)
-CONTROLLER = jax.tree_util.Partial(controllers.phase_plane)
+CONTROLLER = jax.tree_util.Partial(classical.phase_plane)
 COLUMNS = ("agent_steps", "episode_return", "success_rate", "terminal_error_deg")
 ROWS = [("1000", "", "", ""), ("2000", "100", "0.1", "20"), ("3000", "900", "0.5", "1")]
 CURVE = [dict(zip(COLUMNS, row)) for row in ROWS]

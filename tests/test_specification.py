@@ -11,11 +11,12 @@ from bodies import rotated_inertia
 from hypothesis import strategies as st
 
 import attjax
-from attjax import AttitudeEnv, Spacecraft, assurance, controllers, evaluation, slew_references
+from attjax import AttitudeEnv, Spacecraft, assurance, evaluation, slew_references
 from attjax import spacecraft as specification
 from attjax.config import toml
 from attjax.config.presets import PAPER
 from attjax.config.run import Config
+from attjax.control import classical
 from attjax.spacecraft import LM50
 
 CUBESAT = Spacecraft(
@@ -87,10 +88,10 @@ def test_the_users_step_holds_the_torque_that_the_environment_holds(x64):
     assert after.angular_velocity[1] == pytest.approx(2e-3 / 240 / 0.144, rel=1e-6)
 
 
-@pytest.mark.parametrize("controller", controllers.CONTROLLERS)
+@pytest.mark.parametrize("controller", classical.CONTROLLERS)
 def test_classical_controllers_fly_a_cubesat_with_wheels(controller):
     env = AttitudeEnv(frameskip=23, spacecraft=CUBESAT)
-    act = jax.tree_util.Partial(controllers.CONTROLLERS[controller])
+    act = jax.tree_util.Partial(classical.CONTROLLERS[controller])
     flown = evaluation.fly(act, env, env.default_params, jax.random.key(0), 50)
     statistics = evaluation.statistics(flown, env, env.default_params)
     assert statistics["success_rate"] == 1 and statistics["overspeed_rate"] == 0

@@ -194,7 +194,8 @@ def _check_duration(duration, frameskip):
 def _controller(name, arguments, spacecraft):
     import jax
 
-    from attjax import checkpoint, controllers
+    from attjax import checkpoint
+    from attjax.control import classical as controllers
 
     if name != POLICY:
         return jax.tree_util.Partial(controllers.CONTROLLERS[name])

@@ -175,7 +175,7 @@ def evaluate(
         ValueError: there are no episodes.
 
     Example:
-        >>> from attjax.controllers import phase_plane
+        >>> from attjax.control.classical import phase_plane
         >>> evaluate(phase_plane, AttitudeEnv(frameskip=20), episodes=10)["success_rate"]
         1.0
     """

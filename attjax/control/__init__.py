@@ -1,0 +1,1 @@
+"""What decides: classical laws, the inputs of networks, and the guard of the rate limit."""
