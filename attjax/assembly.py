@@ -11,11 +11,11 @@ from attjax import assurance, learner
 from attjax.config import user_functions
 from attjax.config.run import Config
 from attjax.config.settings import Settings
+from attjax.control.features import FEATURES
 from attjax.envs import simulator
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.reward import REWARDS
 from attjax.errors import UserValueError
-from attjax.features import FEATURES
 from attjax.networks import Policy
 from attjax.spacecraft import LM50, Spacecraft
 

@@ -1,7 +1,8 @@
-"""The network inputs that C and ONNX know: how each of attjax.features.FEATURES is written down.
+"""The network inputs that C and ONNX know: how each of attjax.control.features.FEATURES is written
+down.
 
-All numbers are those of :mod:`attjax.features` and :mod:`attjax.dynamics.quaternion`; here is only
-how the formats spell them.
+All numbers are those of :mod:`attjax.control.features` and :mod:`attjax.dynamics.quaternion`; here
+is only how the formats spell them.
 """
 
 from collections.abc import Callable
@@ -9,10 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from attjax import c_text, features
+from attjax import c_text
 from attjax.c_text import Expression
+from attjax.control import features
+from attjax.control.features import Multiscale
 from attjax.dynamics import quaternion as quaternions
-from attjax.features import Multiscale
 
 
 class CInputs(NamedTuple):

@@ -10,9 +10,9 @@ import jax.numpy as jnp
 from flax import struct
 
 from attjax import assurance
+from attjax.control.features import FEATURES
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
-from attjax.features import FEATURES
 
 MASKED_LOGIT = -1e9
 

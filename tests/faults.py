@@ -153,7 +153,7 @@ FAULTS = {
         ["tests/test_losses.py"],
     ),
     "multi-scale features without the period": (
-        "attjax/features.py", "10 * self.control_period, jnp.log(10 * self.control_period)",
+        "attjax/control/features.py", "10 * self.control_period, jnp.log(10 * self.control_period)",
         "0 * self.control_period, 0 * self.control_period", ["tests/test_features.py"],
     ),
     "rate mask without its second-order remainder": (

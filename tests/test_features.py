@@ -2,7 +2,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, features
+from attjax import AttitudeEnv
+from attjax.control import features
 from attjax.envs import observation
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")

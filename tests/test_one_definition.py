@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from test_export import needs_compiler, random_states
 
-from attjax import assurance, export_c, export_inputs, features
+from attjax import assurance, export_c, export_inputs
 from attjax.config import settings
+from attjax.control import features
+from attjax.control.features import Multiscale
 from attjax.dynamics import quaternion
-from attjax.features import Multiscale
 
 KINEMATICS, RATE_MASK = quaternion.derivative, assurance.rate_mask
 

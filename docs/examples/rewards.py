@@ -2,7 +2,7 @@
 
 import jax.numpy as jnp
 
-from attjax import features
+from attjax.control import features
 from attjax.envs import reward
 
 PRICE = 2e4
