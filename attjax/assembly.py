@@ -7,10 +7,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import assurance, learner
+from attjax import learner
 from attjax.config import user_functions
 from attjax.config.run import Config
 from attjax.config.settings import Settings
+from attjax.control import assurance
 from attjax.control.features import FEATURES
 from attjax.envs import simulator
 from attjax.envs.attitude import AttitudeEnv

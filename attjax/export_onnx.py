@@ -93,7 +93,7 @@ def _network(graph, layers, x):
 
 
 def _allowed(graph, flight):
-    """The actions that :class:`attjax.assurance.RateMask` allows, (batch, actions)."""
+    """The actions that :class:`attjax.control.assurance.RateMask` allows, (batch, actions)."""
     mask, rate = flight.rate_mask, "angular_velocity"
     form = graph.constant("peak_rate_form", mask.form)
     twice_impulse = graph.constant("twice_impulse", 2 * mask.impulse.T)

@@ -8,8 +8,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import assurance, provenance
-from attjax.assurance import RateMask
+from attjax import provenance
+from attjax.control import assurance
+from attjax.control.assurance import RateMask
 from attjax.envs import observation as observations
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context

@@ -116,8 +116,8 @@ class SlewEnv(Task, gymnasium.Env):
     def action_masks(self):
         """(actions,) bool: the actions after which coasting keeps within the rate limit.
 
-        As :func:`attjax.assurance.rate_mask` says, at the fraction ``rate_margin`` of the limit;
-        the name is the one that MaskablePPO of sb3-contrib looks for.
+        As :func:`attjax.control.assurance.rate_mask` says, at the fraction ``rate_margin`` of the
+        limit; the name is the one that MaskablePPO of sb3-contrib looks for.
 
         Raises:
             gymnasium.error.ResetNeeded: there was no reset yet.

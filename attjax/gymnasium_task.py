@@ -18,7 +18,7 @@ from gymnasium.utils.seeding import np_random
 from gymnasium.wrappers import TimeLimit
 from jax._src.xla_bridge import backends_are_initialized
 
-from attjax import assurance
+from attjax.control import assurance
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.reward import REWARDS, Transition
 from attjax.envs.simulator import EnvParams

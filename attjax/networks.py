@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from attjax import assurance
+from attjax.control import assurance
 from attjax.control.features import FEATURES
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
@@ -78,7 +78,8 @@ class Policy:
             (size,) and a context, to (features,).
         hidden_sizes: neurons of each hidden layer.
         num_actions: number of actions.
-        rate_margin: the fraction of the rate limit that :func:`attjax.assurance.rate_mask` keeps;
+        rate_margin: the fraction of the rate limit that :func:`attjax.control.assurance.rate_mask`
+        keeps;
             0: no mask.
     """
 

@@ -18,7 +18,8 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from attjax import EnvState, Spacecraft, assurance, dynamics
+from attjax import EnvState, Spacecraft, dynamics
+from attjax.control import assurance
 from attjax.dynamics import rigid_body
 from attjax.envs import simulator
 from attjax.envs.attitude import AttitudeEnv

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from bodies import LM50, rotated_inertia
 
-from attjax import AttitudeEnv, assurance, dynamics
+from attjax import AttitudeEnv, dynamics
+from attjax.control import assurance
 from attjax.dynamics import rigid_body
 from attjax.envs import simulator
 

@@ -14,7 +14,8 @@ from commands import ROOT  # noqa: E402
 from gymnasium.error import ResetNeeded  # noqa: E402
 from gymnasium.wrappers import TimeLimit  # noqa: E402
 
-from attjax import AttitudeEnv, assurance  # noqa: E402
+from attjax import AttitudeEnv  # noqa: E402
+from attjax.control import assurance  # noqa: E402
 from attjax.gymnasium_env import ID, SlewEnv  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("error")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from test_export import needs_compiler, random_states
 
-from attjax import assurance, export_c, export_inputs
+from attjax import export_c, export_inputs
 from attjax.config import settings
-from attjax.control import features
+from attjax.control import assurance, features
 from attjax.control.features import Multiscale
 from attjax.dynamics import quaternion
 

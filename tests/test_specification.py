@@ -11,12 +11,12 @@ from bodies import rotated_inertia
 from hypothesis import strategies as st
 
 import attjax
-from attjax import AttitudeEnv, Spacecraft, assurance, evaluation, slew_references
+from attjax import AttitudeEnv, Spacecraft, evaluation, slew_references
 from attjax import spacecraft as specification
 from attjax.config import toml
 from attjax.config.presets import PAPER
 from attjax.config.run import Config
-from attjax.control import classical
+from attjax.control import assurance, classical
 from attjax.spacecraft import LM50
 
 CUBESAT = Spacecraft(
