@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import evaluation, flight_policy, networks, slew_references
+from attjax import evaluation, flight_policy, networks
+from attjax.control import time_optimal
 from attjax.dynamics import quaternion as quaternions
 from attjax.flight_policy import FlightPolicy
 
@@ -114,7 +115,7 @@ def fly_table_5(flight: FlightPolicy) -> Flown:
 
 def _table_5(craft):
     """The slews of Table 5, about the same axes by fewer or more than 100° where it must be."""
-    start, (least, most) = slew_references.table_5_slews(), craft.slew_angles_deg
+    start, (least, most) = time_optimal.table_5_slews(), craft.slew_angles_deg
     if least <= 100 <= most:
         return start
     axes = start.quaternion[:, :3] / jnp.linalg.norm(start.quaternion[:, :3], axis=1)[:, None]

@@ -8,7 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import canvas, evaluation, slew_references
+from attjax import canvas, evaluation
+from attjax.control import time_optimal
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.simulator import EnvParams, EnvState
@@ -66,7 +67,7 @@ class Flight:
     @functools.cached_property
     def table_5(self):
         """Time and history of Table 5's slews, which two figures show."""
-        return self.record(slew_references.table_5_slews())
+        return self.record(time_optimal.table_5_slews())
 
     def record(self, start: EnvState):
         """Time in s, (steps,), and the history of slews from the given states."""
@@ -93,7 +94,7 @@ def slews(flight: Flight, folder: Path) -> list[Path]:
     """What the paper's Figs. 5–7 show, of Table 5's slews, and the torques chosen."""
     time, history = flight.table_5
     paths = []
-    for index, name in enumerate(slew_references.TABLE_5):
+    for index, name in enumerate(time_optimal.TABLE_5):
         one = jax.tree.map(lambda x, index=index: np.asarray(x[:, index]), history)
         figure, axes = canvas.subplots(4, 1, figsize=(7, 9), sharex=True)
         _plot_components(axes[0], time, one.quaternion, ("q1", "q2", "q3", "q_s"))
@@ -199,7 +200,7 @@ def settling(flight: Flight, folder: Path) -> Path:
     """Settling time against slew angle, with the time-optimal reference."""
     flown, env, params = flight.flown, flight.env, flight.params
     start = flight.starts.quaternion
-    reference = jax.vmap(slew_references.time_optimal_reference, (0, None))
+    reference = jax.vmap(time_optimal.time_optimal_reference, (0, None))
     optimal = np.asarray(reference(start, env.context(params)))
     angles = _angles_deg(start)
     settled = evaluation.successes(flown, params)

@@ -19,16 +19,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import (
-    AttitudeEnv,
-    assembly,
-    checkpoint,
-    export_c,
-    flight_check,
-    provenance,
-    run_folder,
-    slew_references,
-)
+from attjax import AttitudeEnv, assembly, checkpoint, export_c, flight_check, provenance, run_folder
+from attjax.control import time_optimal
 from attjax.flight_check import Decisions
 from attjax.flight_policy import FlightPolicy
 from attjax.networks import Policy
@@ -212,7 +204,7 @@ def _in_float32(flight):
 
     params = flight.env.default_params
     act = jax.tree_util.Partial(flight.policy.act, flight.params)
-    start, steps = slew_references.table_5_slews(), int(params.max_steps_in_episode)
+    start, steps = time_optimal.table_5_slews(), int(params.max_steps_in_episode)
     history = evaluation.record(act, flight.env, params, jax.random.key(0), start, steps)
     angles = jnp.rad2deg(jax.vmap(quaternion.error_angle)(history.quaternion[-1]))
     return ", ".join(f"{angle:.6f}" for angle in angles.tolist())

@@ -119,12 +119,12 @@ FAULTS = {
         ["tests/test_env.py"],
     ),
     "sign in TABLE_5": (
-        "attjax/slew_references.py",
+        "attjax/control/time_optimal.py",
         '"slew2": (0.44228, -0.44228', '"slew2": (0.44228, 0.44228',
         ["tests/test_slew_references.py"],
     ),
     "factor of the time-optimal reference": (
-        "attjax/slew_references.py", "return 2 * numerics.square_root(jnp.sum(momentum)",
+        "attjax/control/time_optimal.py", "return 2 * numerics.square_root(jnp.sum(momentum)",
         "return 3 * numerics.square_root(jnp.sum(momentum)", ["tests/test_slew_references.py"],
     ),
     "reward_scale ignored": (

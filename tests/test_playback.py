@@ -12,7 +12,8 @@ from commands import eval_script, one_line_error
 from pages import CONTROLLERS, ENV, HOSTILE, embedded
 
 import attjax
-from attjax import AttitudeEnv, evaluation, playback, slew_references
+from attjax import AttitudeEnv, evaluation, playback
+from attjax.control import time_optimal
 
 
 def test_the_page_holds_the_recorded_flights():
@@ -37,7 +38,7 @@ def test_the_page_holds_the_recorded_flights():
     evaluated = evaluation.random_slews(env, params, jax.random.key(3), 500)[1]
     starts = jax.tree.map(
         lambda test, random: jnp.concatenate([test, random[: playback.RANDOM_SLEWS]]),
-        slew_references.table_5_slews(),
+        time_optimal.table_5_slews(),
         evaluated,
     )
     for samples, controller in zip(data["flights"].swapaxes(0, 1), CONTROLLERS.values()):

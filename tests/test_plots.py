@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from matplotlib import image
 
-from attjax import AttitudeEnv, evaluation, learning_curve, plots, slew_references
-from attjax.control import classical
+from attjax import AttitudeEnv, evaluation, learning_curve, plots
+from attjax.control import classical, time_optimal
 from attjax.control.classical import average_torque
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.simulator import EnvState
@@ -73,7 +73,7 @@ def test_recorded_slews_are_the_flown_ones(x64):
 
 
 def test_table_5_slews_are_100_degrees():
-    for quaternion in slew_references.TABLE_5.values():
+    for quaternion in time_optimal.TABLE_5.values():
         angle = np.rad2deg(float(quaternions.error_angle(jnp.array(quaternion))))
         assert angle == pytest.approx(100, abs=0.01)
 
@@ -83,12 +83,12 @@ def test_time_optimal_reference_of_table_5():
     for frameskip, expected in ((20, 17.4), (5, 9.3)):
         env = AttitudeEnv(frameskip)
         context = env.context(env.default_params)
-        slew = jnp.array(slew_references.TABLE_5["slew1"])
-        time = slew_references.time_optimal_reference(slew, context)
+        slew = jnp.array(time_optimal.TABLE_5["slew1"])
+        time = time_optimal.time_optimal_reference(slew, context)
         assert float(time) == pytest.approx(expected, abs=0.05)
     acceleration = float(average_torque(context)) / 0.115
     about_y = jnp.array([0.0, np.sin(0.5), 0.0, np.cos(0.5)])  # 1 rad: half gained, half braked
-    time = slew_references.time_optimal_reference(about_y, context)
+    time = time_optimal.time_optimal_reference(about_y, context)
     assert float(time) == pytest.approx(2 * np.sqrt(1 / acceleration), rel=1e-4)
 
 

@@ -11,12 +11,12 @@ from bodies import rotated_inertia
 from hypothesis import strategies as st
 
 import attjax
-from attjax import AttitudeEnv, Spacecraft, evaluation, slew_references
+from attjax import AttitudeEnv, Spacecraft, evaluation
 from attjax import spacecraft as specification
 from attjax.config import toml
 from attjax.config.presets import PAPER
 from attjax.config.run import Config
-from attjax.control import assurance, classical
+from attjax.control import assurance, classical, time_optimal
 from attjax.spacecraft import LM50
 
 CUBESAT = Spacecraft(
@@ -66,7 +66,7 @@ def test_parameters_are_as_described():
 def test_a_held_torque_turns_a_cubesat_by_its_closed_form(x64):
     """From rest about a principal axis: angle U t²/2I, rate U t/I."""
     env = AttitudeEnv(frameskip=23, spacecraft=CUBESAT)
-    state = slew_references.table_5_slews()
+    state = time_optimal.table_5_slews()
     start = jax.tree.map(lambda x: x[0], state).replace(quaternion=jnp.array([0.0, 0, 0, 1]))
     for _ in range(10):
         start = env.step_env(None, start, 1, env.default_params)[1]  # + 2 mN m about x
@@ -124,8 +124,8 @@ def test_time_optimal_reference_needs_no_principal_axes(x64):
     context = env.context(env.default_params)
     slew = jnp.array([0.0, np.sin(0.5), 0.0, np.cos(0.5)])
     tensor = context.replace(inertia=jnp.diag(context.inertia))
-    expected = slew_references.time_optimal_reference(slew, context)
-    assert slew_references.time_optimal_reference(slew, tensor) == pytest.approx(float(expected))
+    expected = time_optimal.time_optimal_reference(slew, context)
+    assert time_optimal.time_optimal_reference(slew, tensor) == pytest.approx(float(expected))
 
 
 def test_a_file_is_read(tmp_path):
