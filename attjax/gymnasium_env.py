@@ -11,13 +11,14 @@ import chex
 import gymnasium
 import numpy as np
 
-from attjax import checks, programs
+from attjax import checks
 from attjax.envs.attitude import AttitudeEnv, steps_key
 from attjax.envs.reward import Transition
 from attjax.envs.simulator import EnvParams
 from attjax.gymnasium_task import Options, Task, check_not_forked, outer_time_limit, random_key
 from attjax.gymnasium_vector import SlewVectorEnv
 from attjax.values import integer
+from attjax.wrappers import compiled
 
 __all__ = ["ID", "SlewEnv", "SlewVectorEnv"]
 
@@ -87,7 +88,7 @@ class SlewEnv(Task, gymnasium.Env):
         self._set_limit(outer_time_limit(self) or self._own_limit)
         key = random_key(self.np_random)
         self._steps_key = steps_key(key)
-        observation, self._state = programs.reset(self._env, self._params, key)
+        observation, self._state = compiled.reset(self._env, self._params, key)
         self._record()
         return np.array(observation), {}
 
@@ -106,7 +107,7 @@ class SlewEnv(Task, gymnasium.Env):
         """
         self._check_reset()
         action = checks.action(action, int(self.action_space.n))
-        self._state, (observation, reward, terminated, truncated, info) = programs.step(
+        self._state, (observation, reward, terminated, truncated, info) = compiled.step(
             self._env, self._params, self._steps_key, self._state, action
         )
         self._record()

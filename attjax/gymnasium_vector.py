@@ -5,9 +5,10 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from attjax import checks, programs
+from attjax import checks
 from attjax.gymnasium_task import Options, Task, check_not_forked, random_key, starting_key
 from attjax.values import integer
+from attjax.wrappers import compiled
 
 EACH_ITS_OWN = ("action_masks", "render")
 """Methods whose result has a part for each spacecraft."""
@@ -79,9 +80,9 @@ class SlewVectorEnv(Task, VectorEnv):
         check_not_forked()
         mask = self._reset_mask(options)
         keys = self._starting_keys(seed)
-        fresh = programs.reset_batch(self._env, self._params, keys)
+        fresh = compiled.reset_batch(self._env, self._params, keys)
         if mask is not None:
-            fresh = programs.choose(mask, fresh, (self._observations, self._state))
+            fresh = compiled.choose(mask, fresh, (self._observations, self._state))
         self._observations, self._state = fresh
         self._ended = np.zeros(self.num_envs, bool) if mask is None else self._ended & ~mask
         self._record()
@@ -106,13 +107,13 @@ class SlewVectorEnv(Task, VectorEnv):
         actions = checks.actions(actions, self.num_envs, int(self.single_action_space.n))
         inputs = self._env, self._params, self._key, self._state, actions
         if self.autoreset_mode == AutoresetMode.SAME_STEP:
-            self._key, self._state, results = programs.step_batch(*inputs)
+            self._key, self._state, results = compiled.step_batch(*inputs)
             final_observations, described, *results = results
         else:
             if self.autoreset_mode == AutoresetMode.DISABLED and self._ended.any():
                 ended = np.flatnonzero(self._ended).tolist()
                 raise ValueError(f"episodes of {ended} ended; reset them with options=reset_mask")
-            self._key, self._state, results = programs.step_batch_later_reset(*inputs, self._ended)
+            self._key, self._state, results = compiled.step_batch_later_reset(*inputs, self._ended)
             described, *results = results
         self._observations = results[0]
         described, results = jax.tree.map(np.array, (described, results))
