@@ -79,11 +79,11 @@ FAULTS = {
         "settings.final_learning_rate, settings.gradient_steps - settings.minibatches", LEARNING,
     ),
     "key reused from update to update": (
-        "attjax/rollout.py",
+        "attjax/ppo/rollout.py",
         "return learner.replace(key=key), steps", "return learner, steps", LEARNING,
     ),
     "same key for all steps of a rollout": (
-        "attjax/rollout.py", "random = (uniform, jax.random.split(flight_key, (length, 2)))",
+        "attjax/ppo/rollout.py", "random = (uniform, jax.random.split(flight_key, (length, 2)))",
         "random = (0 * uniform + uniform[0], jax.random.split(flight_key, (length, 2)))", LEARNING,
     ),
     "reset state cached": (
@@ -97,7 +97,8 @@ FAULTS = {
         "fresh = jax.vmap(reset)(jax.random.split(jax.random.key(0), portion), rows)", LEARNING,
     ),
     "devices draw the same numbers": (
-        "attjax/rollout.py", "jax.random.fold_in(device_key, jax.lax.axis_index(sharding.AXIS))",
+        "attjax/ppo/rollout.py",
+        "jax.random.fold_in(device_key, jax.lax.axis_index(sharding.AXIS))",
         "jax.random.fold_in(device_key, 0)", LEARNING,
     ),
     "closest angle is the last": (
@@ -128,7 +129,7 @@ FAULTS = {
         "return 3 * numerics.square_root(jnp.sum(momentum)", ["tests/test_slew_references.py"],
     ),
     "reward_scale ignored": (
-        "attjax/rollout.py",
+        "attjax/ppo/rollout.py",
         "*= setup.settings.task.reward_scale", "*= 1.0", ["tests/test_rollout.py"],
     ),
     "max_gradient_norm ignored": (

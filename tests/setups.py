@@ -6,7 +6,7 @@ from jax.sharding import PartitionSpec
 
 from attjax import assembly, learner, sharding
 from attjax.config import presets
-from attjax.rollout import rollout
+from attjax.ppo.rollout import rollout
 
 SMALL = {
     "num_envs": 64,

@@ -12,7 +12,7 @@ import attjax
 from attjax import assembly, learner, ppo
 from attjax.config import presets
 from attjax.ppo import train
-from attjax.rollout import encode, episode_sums, greedy_rows, sample
+from attjax.ppo.rollout import encode, episode_sums, greedy_rows, sample
 
 
 def test_spacecraft_are_shared_out_among_the_control_rates():

@@ -15,7 +15,7 @@ from attjax.config.settings import PPO
 from attjax.descent import Sample, optimize
 from attjax.envs import batch
 from attjax.learner import LEARNER_SPECS, Learner, Setup
-from attjax.rollout import Step, encode, episode_sums, rollout
+from attjax.ppo.rollout import Step, encode, episode_sums, rollout
 from attjax.sharding import AXIS, SHARED
 
 
