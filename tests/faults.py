@@ -136,17 +136,17 @@ FAULTS = {
         "attjax/learner.py", "if settings.max_gradient_norm > 0:", "if False:", DESCENT,
     ),
     "normalize_advantage ignored: always": (
-        "attjax/descent.py", "if settings.normalize_advantage:", "if True:", DESCENT,
+        "attjax/ppo/update.py", "if settings.normalize_advantage:", "if True:", DESCENT,
     ),
     "normalize_advantage ignored: never": (
-        "attjax/descent.py", "if settings.normalize_advantage:", "if False:", DESCENT,
+        "attjax/ppo/update.py", "if settings.normalize_advantage:", "if False:", DESCENT,
     ),
     "same shuffle in each pass": (
-        "attjax/descent.py", "jax.random.split(pass_key, settings.passes)",
+        "attjax/ppo/update.py", "jax.random.split(pass_key, settings.passes)",
         "jnp.stack([pass_key] * settings.passes)", DESCENT,
     ),
     "same shuffle on each device": (
-        "attjax/descent.py", "jax.random.fold_in(pass_key, jax.lax.axis_index(AXIS))",
+        "attjax/ppo/update.py", "jax.random.fold_in(pass_key, jax.lax.axis_index(AXIS))",
         "jax.random.fold_in(pass_key, 0)", DESCENT,
     ),
     "approximate KL without its ratio": (

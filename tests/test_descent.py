@@ -10,8 +10,9 @@ from jax.flatten_util import ravel_pytree
 from jax.sharding import PartitionSpec
 from setups import small_attitude_setup
 
-from attjax import descent, learner, sharding
+from attjax import learner, sharding
 from attjax.networks import Inputs
+from attjax.ppo import update as descent
 
 ACTIONS = 19
 WEIGHTS = descent.LossWeights(clip=0.2, entropy=0.0)

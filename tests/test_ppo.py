@@ -9,9 +9,10 @@ from jax.sharding import PartitionSpec
 from probes import Probe
 from setups import fly, settings, small_attitude_setup
 
-from attjax import AttitudeEnv, assembly, descent, learner, ppo, sharding
+from attjax import AttitudeEnv, assembly, learner, ppo, sharding
 from attjax.config import presets
 from attjax.networks import Policy
+from attjax.ppo import update as descent
 
 
 def train(setup, env_params):
