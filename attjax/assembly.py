@@ -7,7 +7,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import learner
 from attjax.config import user_functions
 from attjax.config.run import Config
 from attjax.config.settings import Settings
@@ -18,6 +17,7 @@ from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.reward import REWARDS
 from attjax.errors import UserValueError
 from attjax.networks import Policy
+from attjax.ppo import train_state
 from attjax.spacecraft import LM50, Spacecraft
 
 MAX_DEVICES = 8
@@ -43,7 +43,7 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
     )
 
 
-def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) -> learner.Setup:
+def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) -> train_state.Setup:
     """Environment, policy and settings of a training run.
 
     Raises:
@@ -65,10 +65,10 @@ def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) ->
     if settings.network.rate_margin > 0:
         _check_that_torques_are_left(settings, craft)
     groups = len(settings.task.frameskips)
-    return learner.Setup(env, policy(settings, craft), settings, groups, num_devices)
+    return train_state.Setup(env, policy(settings, craft), settings, groups, num_devices)
 
 
-def of_config(config: Config) -> learner.Setup:
+def of_config(config: Config) -> train_state.Setup:
     """The same of a run's configuration, on as many devices as it is worth.
 
     Raises:
@@ -115,7 +115,7 @@ def num_devices(settings: Settings) -> int:
     return max(n for n in range(1, shared + 1) if shared % n == 0 and n <= most)
 
 
-def env_params(setup: learner.Setup) -> simulator.EnvParams:
+def env_params(setup: train_state.Setup) -> simulator.EnvParams:
     """The spacecraft's parameters, but for the cap on the episode's length.
 
     With several control rates, each group of spacecraft has its own.

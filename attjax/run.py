@@ -6,11 +6,12 @@ from collections.abc import Callable
 import jax
 import numpy as np
 
-from attjax import assembly, learner, metrics, metrics_file, nan_search, ppo
+from attjax import assembly, metrics, metrics_file, nan_search, ppo
 from attjax.config.fields import frameskip_to_judge
 from attjax.config.run import Config
 from attjax.envs.attitude import AttitudeEnv
-from attjax.learner import Learner, Setup
+from attjax.ppo import train_state as learner
+from attjax.ppo.train_state import Learner, Setup
 
 
 class Diverged(Exception):

@@ -75,7 +75,7 @@ FAULTS = {
         "objective = jnp.minimum(", "objective = jnp.maximum(", ["tests/test_losses.py"],
     ),
     "annealing off by one": (
-        "attjax/learner.py", "settings.final_learning_rate, settings.gradient_steps",
+        "attjax/ppo/train_state.py", "settings.final_learning_rate, settings.gradient_steps",
         "settings.final_learning_rate, settings.gradient_steps - settings.minibatches", LEARNING,
     ),
     "key reused from update to update": (
@@ -133,7 +133,7 @@ FAULTS = {
         "*= setup.settings.task.reward_scale", "*= 1.0", ["tests/test_rollout.py"],
     ),
     "max_gradient_norm ignored": (
-        "attjax/learner.py", "if settings.max_gradient_norm > 0:", "if False:", DESCENT,
+        "attjax/ppo/train_state.py", "if settings.max_gradient_norm > 0:", "if False:", DESCENT,
     ),
     "normalize_advantage ignored: always": (
         "attjax/ppo/update.py", "if settings.normalize_advantage:", "if True:", DESCENT,

@@ -4,8 +4,9 @@ import functools
 
 from jax.sharding import PartitionSpec
 
-from attjax import assembly, learner, sharding
+from attjax import assembly, sharding
 from attjax.config import presets
+from attjax.ppo import train_state
 from attjax.ppo.rollout import rollout
 
 SMALL = {
@@ -34,6 +35,6 @@ def small_attitude_setup(updates, preset=presets.PRECISE, **overrides):
 def fly(setup, env_params, state):
     """The learner and the steps of one rollout."""
     on_device = functools.partial(rollout, setup, env_params)
-    out_specs = (learner.LEARNER_SPECS, PartitionSpec(None, sharding.AXIS))
-    in_specs = (learner.LEARNER_SPECS,)
+    out_specs = (train_state.LEARNER_SPECS, PartitionSpec(None, sharding.AXIS))
+    in_specs = (train_state.LEARNER_SPECS,)
     return sharding.on_devices(setup.num_devices, on_device, in_specs, out_specs)(state)

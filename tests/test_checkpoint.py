@@ -5,9 +5,10 @@ import jax
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, run_folder
+from attjax import AttitudeEnv, assembly, checkpoint, ppo, run_folder
 from attjax.config import presets
 from attjax.config.run import Config
+from attjax.ppo import train_state
 from attjax.run_folder import FolderError
 
 SETTINGS = presets.PRECISE.replace(
@@ -28,7 +29,7 @@ def trained(tmp_path_factory):
     run_folder.create(folder, CONFIG, overwrite=False)
     setup = assembly.setup(SETTINGS)
     env_params = assembly.env_params(setup)
-    state = learner.init(setup, env_params, jax.random.key(3))
+    state = train_state.init(setup, env_params, jax.random.key(3))
     state, _ = ppo.train_block(setup, env_params, state, 2)
     with checkpoint.Saver(folder) as saver:
         saver.save(state)
@@ -44,7 +45,7 @@ def copy(learner_state):
 def test_restored_learner_is_the_saved_one_and_goes_on_bitwise(trained):
     folder, setup, env_params, state = trained
     assert checkpoint.latest(folder) == 2
-    template = learner.init(setup, env_params, jax.random.key(99))
+    template = train_state.init(setup, env_params, jax.random.key(99))
     restored = checkpoint.restore_learner(folder, template)
     on_from_memory, _ = ppo.train_block(setup, env_params, copy(state), 2)
     on_from_disk, _ = ppo.train_block(setup, env_params, restored, 2)
@@ -59,7 +60,7 @@ def test_a_run_goes_on_with_another_number_of_devices(trained):
     folder, setup, env_params, state = trained
     setup = dataclasses.replace(setup, num_devices=2)
     env_params = assembly.env_params(setup)
-    template = learner.init(setup, env_params, jax.random.key(99))
+    template = train_state.init(setup, env_params, jax.random.key(99))
     restored = checkpoint.restore_learner(folder, template)
     jax.tree.map(np.testing.assert_array_equal, restored.params, state.params)
     later, metrics = ppo.train_block(setup, env_params, restored, 2)

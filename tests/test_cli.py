@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from commands import ROOT, STEPS_PER_UPDATE, TINY, eval_script, one_line_error, run, train_script
 
-from attjax import checkpoint, evaluation, learner, run_folder
+from attjax import checkpoint, evaluation, run_folder
 from attjax.control import classical
+from attjax.ppo import train_state
 
 
 def metrics(folder):
@@ -127,7 +128,7 @@ def test_divergence_stops_with_status_3_and_keeps_the_last_good_checkpoint(
     before = checkpoint.latest(folder)
     restore = checkpoint.restore_learner
 
-    def spoiled(*arguments) -> learner.Learner:
+    def spoiled(*arguments) -> train_state.Learner:
         state = restore(*arguments)
         broken = jax.tree.map(lambda x: x * np.nan, state.params)
         return state.replace(params=broken)
@@ -169,7 +170,7 @@ def test_too_little_memory_is_one_line(tmp_path, monkeypatch, capsys):
     def too_much(*_):
         raise RuntimeError("RESOURCE_EXHAUSTED: Out of memory allocating 1099511627776 bytes.")
 
-    monkeypatch.setattr(learner, "init", too_much)
+    monkeypatch.setattr(train_state, "init", too_much)
     arguments = [*TINY, "--checkpoint", str(tmp_path / "run")]
     assert "fewer --num-envs" in one_line_error(train_script.main, arguments, capsys)
 

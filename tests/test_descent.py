@@ -10,8 +10,9 @@ from jax.flatten_util import ravel_pytree
 from jax.sharding import PartitionSpec
 from setups import small_attitude_setup
 
-from attjax import learner, sharding
+from attjax import sharding
 from attjax.networks import Inputs
+from attjax.ppo import train_state
 from attjax.ppo import update as descent
 
 ACTIONS = 19
@@ -54,9 +55,9 @@ def new_learner(setup, update=0):
         }
 
     params = {"policy": network(ACTIONS), "value": network(1)}
-    adam = learner.optimizer(setup.settings.ppo)
+    adam = train_state.optimizer(setup.settings.ppo)
     none = jnp.zeros(setup.settings.ppo.num_envs)
-    return learner.Learner(
+    return train_state.Learner(
         params=params,
         optimizer={name: adam.init(ravel_pytree(x)[0]) for name, x in params.items()},
         states=none,
@@ -71,14 +72,14 @@ def new_learner(setup, update=0):
 def optimized(setup, samples, update=0):
     """The learner before, the one after and the metrics."""
     before = new_learner(setup, update)
-    specs = (learner.LEARNER_SPECS, sharding.SPLIT)
+    specs = (train_state.LEARNER_SPECS, sharding.SPLIT)
     run = sharding.on_devices(
         setup.num_devices,
         lambda before, samples: descent.optimize(
             setup.policy, setup.settings.ppo, before, samples, setup.num_devices
         ),
         specs,
-        (learner.LEARNER_SPECS, PartitionSpec()),
+        (train_state.LEARNER_SPECS, PartitionSpec()),
     )
     return before, *jax.jit(run)(before, samples)
 

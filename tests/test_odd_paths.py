@@ -9,7 +9,8 @@ import pytest
 from commands import TINY, eval_script, export_script, train_script
 from test_checkpoint import CONFIG, SETTINGS
 
-from attjax import assembly, checkpoint, export_c, learner, run_folder
+from attjax import assembly, checkpoint, export_c, run_folder
+from attjax.ppo import train_state
 from attjax.run_folder import FolderError
 
 NAMES = [
@@ -21,7 +22,7 @@ NAMES = [
 @pytest.fixture(scope="module")
 def state():
     setup = assembly.setup(SETTINGS)
-    return learner.init(setup, assembly.env_params(setup), jax.random.key(3))
+    return train_state.init(setup, assembly.env_params(setup), jax.random.key(3))
 
 
 @pytest.mark.parametrize("name", NAMES, ids=map(ascii, NAMES))

@@ -8,9 +8,10 @@ import pytest
 from commands import TINY, run
 from test_checkpoint import SETTINGS
 
-from attjax import AttitudeEnv, assembly, checkpoint, learner, ppo, run_folder, step
+from attjax import AttitudeEnv, assembly, checkpoint, ppo, run_folder, step
 from attjax.config import run as run_config
 from attjax.networks import Policy
+from attjax.ppo import train_state
 
 
 def gpus():
@@ -53,13 +54,13 @@ def test_policy_and_value_ask_for_full_precision_products(features):
 
 def test_a_run_on_two_devices_goes_on_on_one(tmp_path):
     setup = assembly.setup(SETTINGS, num_devices=2)
-    state = learner.init(setup, assembly.env_params(setup), jax.random.key(0))
+    state = train_state.init(setup, assembly.env_params(setup), jax.random.key(0))
     run_folder.create(tmp_path, run_config.Config("precise", 0, SETTINGS), overwrite=False)
     with checkpoint.Saver(tmp_path) as saver:
         saver.save(state)
     setup = assembly.setup(SETTINGS)
     env_params = assembly.env_params(setup)
-    template = learner.init(setup, env_params, jax.random.key(1))
+    template = train_state.init(setup, env_params, jax.random.key(1))
     restored = checkpoint.restore_learner(tmp_path, template)
     jax.tree.map(np.testing.assert_array_equal, restored.params, state.params)
     np.testing.assert_array_equal(restored.states.quaternion, state.states.quaternion)

@@ -9,20 +9,23 @@ from jax.sharding import PartitionSpec
 from probes import Probe
 from setups import fly, settings, small_attitude_setup
 
-from attjax import AttitudeEnv, assembly, learner, ppo, sharding
+from attjax import AttitudeEnv, assembly, ppo, sharding
 from attjax.config import presets
 from attjax.networks import Policy
+from attjax.ppo import train_state
 from attjax.ppo import update as descent
 
 
 def train(setup, env_params):
-    state = learner.init(setup, env_params, jax.random.key(0))
+    state = train_state.init(setup, env_params, jax.random.key(0))
     return ppo.train_block(setup, env_params, state, setup.settings.ppo.num_updates)
 
 
 def train_probe(probe, updates=60, num_devices=1, **overrides):
     policy = Policy(hidden_sizes=(32, 32), num_actions=2)
-    setup = learner.Setup(probe, policy, settings(updates, **overrides), num_devices=num_devices)
+    setup = train_state.Setup(
+        probe, policy, settings(updates, **overrides), num_devices=num_devices
+    )
     state, _ = train(setup, probe.default_params)
 
     def value(*observation):
@@ -84,7 +87,7 @@ def test_a_short_training_improves_the_return():
         minibatch_size=512,
     )
     env_params = assembly.env_params(setup)
-    state = learner.init(setup, env_params, jax.random.key(0))
+    state = train_state.init(setup, env_params, jax.random.key(0))
     returns = []
     for _ in range(4):
         state, metrics = ppo.train_block(setup, env_params, state, 30)
@@ -99,7 +102,7 @@ def test_a_short_training_improves_the_return():
 def test_one_compilation_serves_blocks_of_any_length():
     setup = small_attitude_setup(10)
     env_params = assembly.env_params(setup)
-    state = learner.init(setup, env_params, jax.random.key(0))
+    state = train_state.init(setup, env_params, jax.random.key(0))
     before = ppo.train_block._cache_size()
     for length in (1, 2, 3):
         state, _ = ppo.train_block(setup, env_params, state, length)
@@ -112,7 +115,7 @@ def test_blocks_of_any_length_give_the_same_bits():
     env_params = assembly.env_params(setup)
     results = []
     for lengths in ((4,), (1, 3)):
-        state = learner.init(setup, env_params, jax.random.key(7))
+        state = train_state.init(setup, env_params, jax.random.key(7))
         for length in lengths:
             state, _ = ppo.train_block(setup, env_params, state, length)
         results.append(jax.tree.map(np.asarray, state.params))
@@ -123,7 +126,7 @@ def test_learning_rate_anneals_over_the_whole_run():
     """Adam's first step moves each parameter by the learning rate; the last by the final one."""
     chosen = settings(3, passes=2, learning_rate=1e-2, final_learning_rate=1e-4)
     assert (chosen.ppo.num_updates, chosen.ppo.minibatches) == (3, 8)
-    transformation = learner.optimizer(chosen.ppo)
+    transformation = train_state.optimizer(chosen.ppo)
     gradient = jnp.ones(())
     state = transformation.init(gradient)
     moves = []
@@ -135,14 +138,14 @@ def test_learning_rate_anneals_over_the_whole_run():
 
 def test_entropy_bonus_anneals_over_the_whole_run():
     chosen = settings(4, entropy_coefficient=0.01, final_entropy_coefficient=0.002)
-    weights = [float(learner.entropy_coefficient(chosen.ppo, jnp.int32(i))) for i in range(5)]
+    weights = [float(train_state.entropy_coefficient(chosen.ppo, jnp.int32(i))) for i in range(5)]
     np.testing.assert_allclose(weights, [0.01, 0.008, 0.006, 0.004, 0.002], rtol=1e-6)
 
 
 def test_entropy_bonus_is_what_its_weight_takes_off_the_loss():
     setup = small_attitude_setup(1)
     env_params = assembly.env_params(setup)
-    params = learner.init(setup, env_params, jax.random.key(0)).params
+    params = train_state.init(setup, env_params, jax.random.key(0)).params
     context = AttitudeEnv(5).context(AttitudeEnv(5).default_params)
     observation = jnp.zeros((5, 11)).at[:, 8].set(jnp.linspace(0, 0.3, 5))
     inputs = jax.vmap(setup.policy.encode, (0, None))(observation, context)
@@ -158,7 +161,7 @@ def test_entropy_bonus_is_what_its_weight_takes_off_the_loss():
 def test_divergence_names_its_first_update(spoiled):
     setup = small_attitude_setup(4)
     env_params = assembly.env_params(setup)
-    state = learner.init(setup, env_params, jax.random.key(0))
+    state = train_state.init(setup, env_params, jax.random.key(0))
     if spoiled == "observations":
         states = state.states
         states = states.replace(quaternion=states.quaternion.at[0].set(jnp.nan))
@@ -181,12 +184,12 @@ def test_two_devices_take_the_gradient_step_of_one():
     """One minibatch holds all samples, so their order and their halves do not matter."""
     one = small_attitude_setup(1, frameskips=(20,), minibatch_size=64 * 16, passes=1)
     env_params = assembly.env_params(one)
-    _, steps = fly(one, env_params, learner.init(one, env_params, jax.random.key(0)))
+    _, steps = fly(one, env_params, train_state.init(one, env_params, jax.random.key(0)))
     steps = jax.tree.map(np.asarray, steps)
     results = []
     for num_devices in (1, 2):
         setup = dataclasses.replace(one, num_devices=num_devices)
-        state = learner.init(setup, env_params, jax.random.key(0))
+        state = train_state.init(setup, env_params, jax.random.key(0))
         optimize = functools.partial(on_samples, setup, env_params, state)
         results.append(jax.jit(optimize)(steps))
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-3, atol=1e-7), *results)
@@ -202,7 +205,7 @@ def on_samples(setup, env_params, state, steps):
         )[0].optimizer
 
     split = PartitionSpec(None, sharding.AXIS)
-    specs = (learner.LEARNER_SPECS, split)
+    specs = (train_state.LEARNER_SPECS, split)
     return sharding.on_devices(setup.num_devices, on_device, specs, PartitionSpec())(state, steps)
 
 

@@ -9,9 +9,9 @@ import pytest
 from setups import fly, small_attitude_setup
 
 import attjax
-from attjax import assembly, learner, ppo
+from attjax import assembly, ppo
 from attjax.config import presets
-from attjax.ppo import train
+from attjax.ppo import train, train_state
 from attjax.ppo.rollout import encode, episode_sums, greedy_rows, sample
 
 
@@ -47,7 +47,7 @@ def test_rollout_and_gradient_steps_each_leave_a_fresh_key():
     """A key used twice, in a rollout and for its shuffles, would tie them to each other."""
     setup = small_attitude_setup(2)
     env_params = assembly.env_params(setup)
-    state = learner.init(setup, env_params, jax.random.key(0))
+    state = train_state.init(setup, env_params, jax.random.key(0))
     flown, _ = fly(setup, env_params, state)
     keys = [np.array(jax.random.key_data(x.key)) for x in (state, flown)]
     trained, _ = ppo.train_block(setup, env_params, state, 1)
@@ -59,7 +59,7 @@ def test_rollout_and_gradient_steps_each_leave_a_fresh_key():
 def test_a_share_of_the_spacecraft_acts_greedily(share):
     setup = small_attitude_setup(1, greedy_share=share)
     env_params = assembly.env_params(setup)
-    state = learner.init(setup, env_params, jax.random.key(0))
+    state = train_state.init(setup, env_params, jax.random.key(0))
     _, steps = fly(setup, env_params, state)
     log_probabilities = jax.vmap(setup.policy.log_probabilities, (None, 0))(
         state.params, steps.inputs
@@ -85,7 +85,7 @@ def test_only_whole_episodes_count_in_the_metrics():
         stagger_episodes=False,
     )
     env_params = assembly.env_params(setup)
-    state = learner.init(setup, env_params, jax.random.key(0))
+    state = train_state.init(setup, env_params, jax.random.key(0))
     _, steps = fly(setup, env_params, state)
     assert not steps.terminated.any()
     ends = [np.flatnonzero(column) for column in np.asarray(steps.truncated).T]
@@ -112,12 +112,12 @@ def test_training_episodes_are_capped_in_agent_steps():
 def test_staggered_episodes_start_at_random_times():
     staggered = small_attitude_setup(1, near_goal_share=0.0)
     env_params = assembly.env_params(staggered)
-    times = learner.init(staggered, env_params, jax.random.key(0)).states.time
+    times = train_state.init(staggered, env_params, jax.random.key(0)).states.time
     assert len(set(times.tolist())) > 5 and int(times.max()) < 700
     together = dataclasses.replace(
         staggered, settings=staggered.settings.replace(stagger_episodes=False)
     )
-    assert not learner.init(together, env_params, jax.random.key(0)).states.time.any()
+    assert not train_state.init(together, env_params, jax.random.key(0)).states.time.any()
 
 
 def test_sampled_actions_follow_their_probabilities_and_never_the_mask():
@@ -135,7 +135,7 @@ def test_every_spacecraft_and_device_draws_its_own_numbers(num_devices):
     setup = small_attitude_setup(1, near_goal_share=0.0, greedy_share=0.0)
     setup = dataclasses.replace(setup, num_devices=num_devices)
     env_params = assembly.env_params(setup)
-    state = learner.init(setup, env_params, jax.random.key(0))
+    state = train_state.init(setup, env_params, jax.random.key(0))
     assert len(np.unique(state.states.quaternion[:, 3])) == 64
     _, steps = fly(setup, env_params, state)
     assert steps.action.shape == (16, 64)
@@ -146,7 +146,7 @@ def test_devices_hold_the_control_rates_of_their_part():
     """Row i of a device steps with the control period that the policy is told."""
     setup = dataclasses.replace(small_attitude_setup(1, near_goal_share=0.0), num_devices=2)
     env_params = assembly.env_params(setup)
-    state = learner.init(setup, env_params, jax.random.key(0))
+    state = train_state.init(setup, env_params, jax.random.key(0))
     before = state.states
     _, steps = fly(setup, env_params, state)
     first = jax.tree.map(lambda x: x[0], steps)
@@ -165,7 +165,7 @@ def test_the_learner_sees_the_reward_times_its_scale(scale):
         1, presets.PAPER_FAST, frameskips=(20,), rollout_length=2, reward_scale=scale
     )
     env_params = assembly.env_params(setup)
-    state = learner.init(setup, env_params, jax.random.key(0))
+    state = train_state.init(setup, env_params, jax.random.key(0))
     _, steps = fly(setup, env_params, state)
     assert np.ptp(steps.score[0]) > 0.1
     np.testing.assert_allclose(steps.reward[0], scale * steps.score[0], rtol=1e-6)

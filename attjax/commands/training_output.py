@@ -1,8 +1,9 @@
 """What ``train.py`` prints of a run: what it is, how it goes, how it ended."""
 
-from attjax import errors, learner
+from attjax import errors
 from attjax.config import arguments
 from attjax.config.settings import Settings
+from attjax.ppo import train_state
 from attjax.progress import Progress
 from attjax.run import Diverged, Run
 from attjax.signals import StopSignals
@@ -77,7 +78,7 @@ def _announce_longer(run, before):
     """Print what a larger total than before changes from here on."""
     old, new = before.ppo, run.config.settings.ppo
     steps = run.update * new.passes * new.minibatches
-    slow, fast = (learner.learning_rate(ppo, steps) for ppo in (old, new))
+    slow, fast = (train_state.learning_rate(ppo, steps) for ppo in (old, new))
     print(
         f"total steps raised from {old.total_steps:,} to {new.total_steps:,}: "
         f"at {run.agent_steps:,} the learning rate goes from {slow:.3g} to {fast:.3g}, and from "

@@ -10,8 +10,8 @@ from flax import struct
 
 from attjax import losses, sharding
 from attjax.envs import batch
-from attjax.learner import Learner, Setup
 from attjax.networks import Inputs, Policy
+from attjax.ppo.train_state import Learner, Setup
 
 
 @struct.dataclass

@@ -13,8 +13,8 @@ import jax.numpy as jnp
 from attjax import losses, sharding
 from attjax.config.settings import PPO
 from attjax.envs import batch
-from attjax.learner import LEARNER_SPECS, Learner, Setup
 from attjax.ppo.rollout import Step, encode, episode_sums, rollout
+from attjax.ppo.train_state import LEARNER_SPECS, Learner, Setup
 from attjax.ppo.update import Sample, optimize
 from attjax.sharding import AXIS, SHARED
 

@@ -12,8 +12,8 @@ from jax.flatten_util import ravel_pytree
 
 from attjax import losses
 from attjax.config.settings import PPO
-from attjax.learner import Learner, entropy_coefficient, optimizer
 from attjax.networks import Inputs, Policy
+from attjax.ppo.train_state import Learner, entropy_coefficient, optimizer
 from attjax.sharding import AXIS
 
 MAX_INDEX_BITS = 18
