@@ -16,8 +16,8 @@ from attjax.envs import simulator
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.reward import REWARDS
 from attjax.errors import UserValueError
-from attjax.networks import Policy
 from attjax.ppo import train_state
+from attjax.ppo.networks import Policy
 from attjax.spacecraft import LM50, Spacecraft
 
 MAX_DEVICES = 8

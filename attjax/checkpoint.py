@@ -18,7 +18,7 @@ import numpy as np
 import orbax.checkpoint as ocp
 
 from attjax import assembly, belongings, quiet, run_folder
-from attjax.networks import Policy
+from attjax.ppo.networks import Policy
 from attjax.ppo.train_state import Learner
 from attjax.run_folder import FolderError
 

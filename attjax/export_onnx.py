@@ -11,9 +11,10 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 import attjax
-from attjax import c_names, networks
+from attjax import c_names
 from attjax.export_inputs import FORMS
 from attjax.flight_policy import FlightPolicy
+from attjax.ppo import networks
 
 FILES = ("attjax_policy.onnx",)
 OPSET = 17

@@ -7,10 +7,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import evaluation, flight_policy, networks
+from attjax import evaluation, flight_policy
 from attjax.control import time_optimal
 from attjax.dynamics import quaternion as quaternions
 from attjax.flight_policy import FlightPolicy
+from attjax.ppo import networks
 
 TIE = 1e-4
 """Actions whose logits differ by less than this share of the logits' range are tied."""

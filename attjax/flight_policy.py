@@ -14,7 +14,7 @@ from attjax.control.assurance import RateMask
 from attjax.envs import observation as observations
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
-from attjax.networks import Policy
+from attjax.ppo.networks import Policy
 from attjax.provenance import Origin
 
 

@@ -23,7 +23,7 @@ from attjax import AttitudeEnv, assembly, checkpoint, export_c, flight_check, pr
 from attjax.control import time_optimal
 from attjax.flight_check import Decisions
 from attjax.flight_policy import FlightPolicy
-from attjax.networks import Policy
+from attjax.ppo.networks import Policy
 from attjax.spacecraft import LM50
 
 SLEWS = 400

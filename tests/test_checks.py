@@ -8,7 +8,7 @@ import pytest
 from attjax import AttitudeEnv, EnvState, Spacecraft, checks, dynamics, step
 from attjax.control import classical
 from attjax.envs import batch
-from attjax.networks import Policy
+from attjax.ppo.networks import Policy
 
 ENV = AttitudeEnv(frameskip=5)
 PARAMS = ENV.default_params

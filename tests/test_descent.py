@@ -11,9 +11,9 @@ from jax.sharding import PartitionSpec
 from setups import small_attitude_setup
 
 from attjax import sharding
-from attjax.networks import Inputs
 from attjax.ppo import train_state
 from attjax.ppo import update as descent
+from attjax.ppo.networks import Inputs
 
 ACTIONS = 19
 WEIGHTS = descent.LossWeights(clip=0.2, entropy=0.0)

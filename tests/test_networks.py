@@ -5,7 +5,7 @@ import pytest
 
 from attjax import AttitudeEnv
 from attjax.envs import observation
-from attjax.networks import Inputs, Policy
+from attjax.ppo.networks import Inputs, Policy
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

@@ -10,8 +10,8 @@ from test_checkpoint import SETTINGS
 
 from attjax import AttitudeEnv, assembly, checkpoint, ppo, run_folder, step
 from attjax.config import run as run_config
-from attjax.networks import Policy
 from attjax.ppo import train_state
+from attjax.ppo.networks import Policy
 
 
 def gpus():

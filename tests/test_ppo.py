@@ -11,9 +11,9 @@ from setups import fly, settings, small_attitude_setup
 
 from attjax import AttitudeEnv, assembly, ppo, sharding
 from attjax.config import presets
-from attjax.networks import Policy
 from attjax.ppo import train_state
 from attjax.ppo import update as descent
+from attjax.ppo.networks import Policy
 
 
 def train(setup, env_params):

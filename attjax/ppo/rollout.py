@@ -10,7 +10,7 @@ from flax import struct
 
 from attjax import losses, sharding
 from attjax.envs import batch
-from attjax.networks import Inputs, Policy
+from attjax.ppo.networks import Inputs, Policy
 from attjax.ppo.train_state import Learner, Setup
 
 

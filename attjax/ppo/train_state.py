@@ -16,7 +16,7 @@ from flax import struct
 from attjax import sharding
 from attjax.config.settings import PPO, Settings
 from attjax.envs import batch
-from attjax.networks import Policy
+from attjax.ppo.networks import Policy
 from attjax.sharding import SHARED, SPLIT
 
 

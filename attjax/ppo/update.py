@@ -12,7 +12,7 @@ from jax.flatten_util import ravel_pytree
 
 from attjax import losses
 from attjax.config.settings import PPO
-from attjax.networks import Inputs, Policy
+from attjax.ppo.networks import Inputs, Policy
 from attjax.ppo.train_state import Learner, entropy_coefficient, optimizer
 from attjax.sharding import AXIS
 
