@@ -63,15 +63,15 @@ FAULTS = {
         ["tests/test_env.py"],
     ),
     "GAE bootstraps over a termination": (
-        "attjax/losses.py",
+        "attjax/ppo/losses.py",
         "jnp.where(terminated, 0.0, next_values)", "next_values", ["tests/test_losses.py"],
     ),
     "GAE runs over the end of an episode": (
-        "attjax/losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)",
+        "attjax/ppo/losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)",
         ["tests/test_losses.py"],
     ),
     "clipped objective without the pessimistic bound": (
-        "attjax/losses.py",
+        "attjax/ppo/losses.py",
         "objective = jnp.minimum(", "objective = jnp.maximum(", ["tests/test_losses.py"],
     ),
     "annealing off by one": (
@@ -150,7 +150,7 @@ FAULTS = {
         "jax.random.fold_in(pass_key, 0)", DESCENT,
     ),
     "approximate KL without its ratio": (
-        "attjax/losses.py", "jnp.mean(ratio - 1 - log_ratio)", "jnp.mean(-log_ratio)",
+        "attjax/ppo/losses.py", "jnp.mean(ratio - 1 - log_ratio)", "jnp.mean(-log_ratio)",
         ["tests/test_losses.py"],
     ),
     "multi-scale features without the period": (

@@ -3,7 +3,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import losses
+from attjax.ppo import losses
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

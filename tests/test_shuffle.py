@@ -5,8 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax import losses
-from attjax.ppo import update
+from attjax.ppo import losses, update
 
 
 def test_large_orders_leave_few_random_bits_to_none(monkeypatch):

@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import losses, sharding
+from attjax import sharding
 from attjax.envs import batch
+from attjax.ppo import losses
 from attjax.ppo.networks import Inputs, Policy
 from attjax.ppo.train_state import Learner, Setup
 

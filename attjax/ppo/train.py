@@ -10,9 +10,10 @@ import chex
 import jax
 import jax.numpy as jnp
 
-from attjax import losses, sharding
+from attjax import sharding
 from attjax.config.settings import PPO
 from attjax.envs import batch
+from attjax.ppo import losses
 from attjax.ppo.rollout import Step, encode, episode_sums, rollout
 from attjax.ppo.train_state import LEARNER_SPECS, Learner, Setup
 from attjax.ppo.update import Sample, optimize

@@ -10,8 +10,8 @@ import optax
 from flax import struct
 from jax.flatten_util import ravel_pytree
 
-from attjax import losses
 from attjax.config.settings import PPO
+from attjax.ppo import losses
 from attjax.ppo.networks import Inputs, Policy
 from attjax.ppo.train_state import Learner, entropy_coefficient, optimizer
 from attjax.sharding import AXIS
