@@ -14,7 +14,7 @@ from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.simulator import EnvParams, EnvState
 from attjax.evaluation.episodes import Controller, Episodes
-from attjax.report import PAPER_TABLE_2, is_the_papers
+from attjax.evaluation.tables import PAPER_TABLE_2, is_the_papers
 
 STYLES = ("-", "--", "-.", ":")
 RANDOM_SLEWS = 200

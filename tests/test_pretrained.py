@@ -6,7 +6,7 @@ import jax
 import pytest
 
 from attjax import AttitudeEnv, checkpoint, evaluation
-from attjax.report import PAPER_TABLE_2
+from attjax.evaluation.tables import PAPER_TABLE_2
 
 FOLDER = Path(__file__).parent.parent / "pretrained" / "precise"
 

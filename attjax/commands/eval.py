@@ -111,8 +111,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file):
     """Fly, draw, write and print."""
     # Imported late: with them, --help and errors in the arguments would take seconds.
-    from attjax import evaluation, report
+    from attjax import evaluation
     from attjax.envs.attitude import AttitudeEnv
+    from attjax.evaluation import tables
 
     env = AttitudeEnv(arguments.frameskip, spacecraft=spacecraft)
     params, seed, episodes = env.default_params, arguments.seed or 0, arguments.episodes
@@ -138,9 +139,9 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file):
         for path in written:
             print(f"wrote {path}")
         if arguments.compare:
-            report.print_comparison(results, spacecraft)
+            tables.print_comparison(results, spacecraft)
         else:
-            report.print_report(results[0], spacecraft)
+            tables.print_report(results[0], spacecraft)
         print(f"evaluated in {seconds:.1f} s, compilation included")
     return 0
 
