@@ -10,8 +10,9 @@ from own_environment import BIAS, BRAKE, Weak
 from pages import embedded
 
 import attjax
-from attjax import AttitudeEnv, EnvState, Spacecraft, evaluation, flight_check, playback, plots
+from attjax import AttitudeEnv, EnvState, Spacecraft, evaluation, flight_check, playback
 from attjax.envs import simulator
+from attjax.evaluation import plots
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

@@ -19,7 +19,7 @@ def prepare_plots(folder: Path | None) -> ModuleType | None:
         return None
     os.environ["MPLBACKEND"] = "agg"  # one of a notebook or of another matplotlib fails its import
     try:
-        from attjax import plots
+        from attjax.evaluation import plots
     except ImportError:
         raise errors.UserError("--plot needs matplotlib: pip install 'attjax[plot]'") from None
     except ValueError as error:
@@ -74,12 +74,14 @@ def write_json(file: Path | TextIO, content: dict) -> None:
 
 
 def draw(flight: Any, rows: list[dict], folder: Path) -> list[Path]:
-    """Draw a :class:`attjax.plots.Flight`, and the training before it where there are its rows.
+    """Draw a :class:`attjax.evaluation.plots.Flight`, and the training before it where there are
+    its rows.
 
     Returns:
         The files written.
     """
-    from attjax import learning_curve, plots
+    from attjax import learning_curve
+    from attjax.evaluation import plots
 
     written = plots.write_all(flight, folder)
     return written + learning_curve.write(rows, flight.is_the_papers, folder)
