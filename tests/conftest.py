@@ -4,8 +4,9 @@ import pytest
 from commands import STEPS_PER_UPDATE, TINY, run
 from fuzzing import Accepted
 
-from attjax import evaluation, playback, training
+from attjax import evaluation, training
 from attjax.commands import training_output
+from attjax.evaluation.playback import page as playback
 
 jax.config.update("jax_num_cpu_devices", 2)  # what is shared out over devices is tested on two
 jax.config.update("jax_legacy_prng_key", "error")  # typed keys throughout

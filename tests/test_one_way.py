@@ -10,9 +10,10 @@ from own_environment import BIAS, BRAKE, Weak
 from pages import embedded
 
 import attjax
-from attjax import AttitudeEnv, EnvState, Spacecraft, evaluation, flight_check, playback
+from attjax import AttitudeEnv, EnvState, Spacecraft, evaluation, flight_check
 from attjax.envs import simulator
 from attjax.evaluation import plots
+from attjax.evaluation.playback import page as playback
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 

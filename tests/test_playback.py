@@ -12,8 +12,9 @@ from commands import eval_script, one_line_error
 from pages import CONTROLLERS, ENV, HOSTILE, embedded
 
 import attjax
-from attjax import AttitudeEnv, evaluation, playback
+from attjax import AttitudeEnv, evaluation
 from attjax.control import time_optimal
+from attjax.evaluation.playback import page as playback
 
 
 def test_the_page_holds_the_recorded_flights():

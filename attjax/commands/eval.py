@@ -148,7 +148,7 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file):
 
 def _write_playback(arguments, controllers, env, params):
     """The controller that is judged beside phase-plane, or that beside feedback."""
-    from attjax import playback
+    from attjax.evaluation.playback import page as playback
 
     name = next(iter(controllers))
     other = "feedback" if name == "phase-plane" else "phase-plane"

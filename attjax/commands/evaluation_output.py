@@ -38,11 +38,11 @@ def prepare_playback(path: Path | None, steps: int) -> None:
     """
     if path is None:
         return
-    from attjax import playback
+    from attjax.evaluation.playback import page
 
-    if steps > playback.MAX_STEPS:
+    if steps > page.MAX_STEPS:
         raise errors.UserError(
-            f"--playback shows slews of at most {playback.MAX_STEPS:,} agent steps, and these "
+            f"--playback shows slews of at most {page.MAX_STEPS:,} agent steps, and these "
             f"have {steps:,}: give a shorter --duration or a larger --frameskip"
         )
     if os.path.exists(path) and not os.path.isfile(path):

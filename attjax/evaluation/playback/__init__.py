@@ -1,0 +1,1 @@
+"""The web page that replays slews in 3-D."""
