@@ -1,8 +1,8 @@
 """Checkpoints in a run folder, one Orbax folder a saved update, named by its number.
 
 Each holds two items: ``policy``, all that evaluation needs beside config.json, and ``learner``,
-all that training needs to go on; and a label (see :mod:`attjax.belongings`). It is written aside,
-read back, and moved into place whole.
+all that training needs to go on; and a label (see :mod:`attjax.runs.belongings`). It is written
+aside, read back, and moved into place whole.
 """
 
 import contextlib
@@ -17,10 +17,11 @@ import jax
 import numpy as np
 import orbax.checkpoint as ocp
 
-from attjax import assembly, belongings, quiet, run_folder
+from attjax import assembly, quiet, run_folder
 from attjax.ppo.networks import Policy
 from attjax.ppo.train_state import Learner
 from attjax.run_folder import FolderError
+from attjax.runs import belongings
 
 NEWEST_KEPT = 3
 PLAIN = r"[A-Za-z0-9_./ +=,@-]*"

@@ -13,10 +13,11 @@ import re
 import uuid
 from pathlib import Path
 
-from attjax import belongings, spacecraft
+from attjax import spacecraft
 from attjax.config import settings
 from attjax.config.run import Config
 from attjax.errors import UserError, warning_line
+from attjax.runs import belongings
 
 try:
     import fcntl

@@ -17,8 +17,9 @@ from tensorboardX.proto.summary_pb2 import Summary
 from tensorboardX.record_writer import masked_crc32c
 from tensorboardX.summary import hparams
 
-from attjax import belongings, metrics, metrics_file, run_folder
+from attjax import metrics, metrics_file, run_folder
 from attjax.config import run as run_config
+from attjax.runs import belongings
 
 RATE = "time/steps_per_s"
 """Agent steps a second between two rows."""

@@ -7,9 +7,10 @@ import pytest
 from commands import STEPS_PER_UPDATE, train_script
 from test_checkpoint import CONFIG
 
-from attjax import belongings, checkpoint, run_folder
+from attjax import checkpoint, run_folder
 from attjax.config import run as run_config
 from attjax.run_folder import FolderError
+from attjax.runs import belongings
 
 NEW = run_config.Config("paper", 1, CONFIG.settings)
 

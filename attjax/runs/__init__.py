@@ -1,0 +1,1 @@
+"""Training runs: what they are made of, what they leave behind, what they show."""
