@@ -17,11 +17,12 @@ import jax
 import numpy as np
 import orbax.checkpoint as ocp
 
-from attjax import assembly, quiet, run_folder
+from attjax import assembly, quiet
 from attjax.ppo.networks import Policy
 from attjax.ppo.train_state import Learner
-from attjax.run_folder import FolderError
 from attjax.runs import belongings
+from attjax.runs import folder as run_folder
+from attjax.runs.folder import FolderError
 
 NEWEST_KEPT = 3
 PLAIN = r"[A-Za-z0-9_./ +=,@-]*"

@@ -4,11 +4,12 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from attjax import assembly, run_folder
+from attjax import assembly
 from attjax.config import run as run_config
 from attjax.config.settings import Settings
 from attjax.keeper import Keeper, Place
 from attjax.run import Diverged, Run
+from attjax.runs import folder as run_folder
 from attjax.spacecraft import Spacecraft
 
 

@@ -170,7 +170,8 @@ class Examiner:
         """The newest policy's figures."""
         import jax
 
-        from attjax import checkpoint, run_folder
+        from attjax import checkpoint
+        from attjax.runs import folder as run_folder
 
         update = checkpoint.latest(self._folder)
         policy = checkpoint.restore_policy(self._folder)

@@ -19,7 +19,7 @@ import markdown
 from commands import ROOT, STEPS_PER_UPDATE, TINY, eval_script, export_script, train_script
 from packaging.requirements import Requirement
 
-from attjax import run_folder
+from attjax.runs import folder as run_folder
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 SHORT = [flag for flag in TINY if not flag.startswith("--frameskips")]

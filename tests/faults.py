@@ -174,7 +174,7 @@ FAULTS = {
         "attjax/metrics_file.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
     ),
     "no lock on the folder": (
-        "attjax/run_folder.py", "fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,
+        "attjax/runs/folder.py", "fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,
     ),
 }  # fmt: skip
 """By name: module, code, what it becomes, tests that should catch it."""

@@ -14,7 +14,7 @@ from attjax.control import classical
 from attjax.errors import UserError
 from attjax.keeper import Place
 from attjax.run import Diverged
-from attjax.run_folder import FolderError
+from attjax.runs.folder import FolderError
 
 SMALL = {
     "frameskips": (5, 20), "num_envs": 16, "rollout_length": 8, "minibatch_size": 32,

@@ -7,10 +7,11 @@ import pytest
 from commands import STEPS_PER_UPDATE, train_script
 from test_checkpoint import CONFIG
 
-from attjax import checkpoint, run_folder
+from attjax import checkpoint
 from attjax.config import run as run_config
-from attjax.run_folder import FolderError
 from attjax.runs import belongings
+from attjax.runs import folder as run_folder
+from attjax.runs.folder import FolderError
 
 NEW = run_config.Config("paper", 1, CONFIG.settings)
 

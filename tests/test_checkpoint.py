@@ -5,11 +5,12 @@ import jax
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, assembly, checkpoint, ppo, run_folder
+from attjax import AttitudeEnv, assembly, checkpoint, ppo
 from attjax.config import presets
 from attjax.config.run import Config
 from attjax.ppo import train_state
-from attjax.run_folder import FolderError
+from attjax.runs import folder as run_folder
+from attjax.runs.folder import FolderError
 
 SETTINGS = presets.PRECISE.replace(
     frameskips=(5, 20),

@@ -5,10 +5,10 @@ import tomllib
 import pytest
 from commands import ROOT, one_line_error, run, train_script
 
-from attjax import run_folder
 from attjax.config import presets, toml
 from attjax.config import run as run_config
 from attjax.errors import UserError
+from attjax.runs import folder as run_folder
 from attjax.spacecraft import LM50
 
 

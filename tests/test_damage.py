@@ -11,9 +11,9 @@ from fuzzing import FUZZ, content, refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from attjax import run_folder
 from attjax.config import presets
 from attjax.config.settings import SUBJECT_OF
+from attjax.runs import folder as run_folder
 
 # Orbax leaves coroutines behind where a file is damaged; processes of their own show no sign of it.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")

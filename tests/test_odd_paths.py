@@ -9,9 +9,10 @@ import pytest
 from commands import TINY, eval_script, export_script, train_script
 from test_checkpoint import CONFIG, SETTINGS
 
-from attjax import assembly, checkpoint, export_c, run_folder
+from attjax import assembly, checkpoint, export_c
 from attjax.ppo import train_state
-from attjax.run_folder import FolderError
+from attjax.runs import folder as run_folder
+from attjax.runs.folder import FolderError
 
 NAMES = [
     "run[1]", "[!a]*?", "{x}{}", "sp ace", "ünï", "line\nbreak\n", "%41#", "back\\slash", "~",

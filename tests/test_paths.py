@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from commands import eval_script, export_script, one_line_error, python, train_script
 
-from attjax import run_folder
 from attjax.config import arguments as cli
 from attjax.config import presets, toml
 from attjax.config import run as run_config
+from attjax.runs import folder as run_folder
 
 SCRIPTS = {"train.py": train_script, "eval.py": eval_script, "export.py": export_script}
 
@@ -75,7 +75,7 @@ def test_a_new_folder_may_hold_hidden_files_and_the_log_of_its_own_run(tmp_path)
     (tmp_path / "lost+found").mkdir()
     code = f"""
 from pathlib import Path
-from attjax import run_folder
+from attjax.runs import folder as run_folder
 from attjax.config import run as run_config
 from attjax.config import presets
 config = run_config.Config("paper", 0, presets.PAPER)

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from test_checkpoint import CONFIG
 
-from attjax import run_folder
 from attjax.config import run as run_config
 from attjax.config.presets import PRECISE
-from attjax.run_folder import FolderError
+from attjax.runs import folder as run_folder
+from attjax.runs.folder import FolderError
 
 
 def test_config_round_trip(tmp_path):
@@ -127,7 +127,7 @@ def test_files_that_are_no_configuration_are_refused(tmp_path, text):
 def test_only_one_process_trains_in_a_folder(tmp_path):
     script = f"""
 import pathlib, sys
-from attjax import run_folder
+from attjax.runs import folder as run_folder
 from attjax.config import run as run_config
 with run_folder.opened(pathlib.Path({str(tmp_path)!r})):
     print("open", flush=True)

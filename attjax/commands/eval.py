@@ -8,10 +8,11 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from attjax import destinations, devices, errors, run_folder
+from attjax import destinations, devices, errors
 from attjax.commands import evaluation_output
 from attjax.config import arguments as cli
 from attjax.config import fields, toml
+from attjax.runs import folder as run_folder
 from attjax.spacecraft import INTEGRATION_STEP, LM50, MOST_DURATION
 
 POLICY = "policy"

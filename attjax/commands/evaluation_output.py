@@ -6,7 +6,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TextIO
 
-from attjax import destinations, errors, run_folder
+from attjax import destinations, errors
+from attjax.runs import folder as run_folder
 
 
 def prepare_plots(folder: Path | None) -> ModuleType | None:
