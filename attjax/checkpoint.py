@@ -17,10 +17,10 @@ import jax
 import numpy as np
 import orbax.checkpoint as ocp
 
-from attjax import assembly, quiet
+from attjax import assembly
 from attjax.ppo.networks import Policy
 from attjax.ppo.train_state import Learner
-from attjax.runs import belongings
+from attjax.runs import belongings, quiet
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 from commands import python
 
-from attjax import quiet
+from attjax.runs import quiet
 
 FRESH = """
 import ast, codecs, importlib, logging, os, pkgutil, signal, warnings
