@@ -4,11 +4,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from attjax.checkpoint import load_policy
     from attjax.envs.attitude import AttitudeEnv
     from attjax.envs.batch import open_loop
     from attjax.envs.simulator import EnvParams, EnvState, step
     from attjax.evaluation import evaluate
+    from attjax.runs.checkpoint import load_policy
     from attjax.spacecraft import LM50, Spacecraft
     from attjax.training import train
 
@@ -33,7 +33,7 @@ _MODULES = {
     "LM50": "attjax.spacecraft",
     "Spacecraft": "attjax.spacecraft",
     "evaluate": "attjax.evaluation",
-    "load_policy": "attjax.checkpoint",
+    "load_policy": "attjax.runs.checkpoint",
     "open_loop": "attjax.envs.batch",
     "step": "attjax.envs.simulator",
     "train": "attjax.training",

@@ -87,7 +87,7 @@ def main(argv=None) -> int:
 
 def learning_curve(name: str, arguments) -> list[Point]:
     """Train a recipe to its end or to the limit, evaluating on the way."""
-    from attjax import checkpoint
+    from attjax.runs import checkpoint
 
     curve, looked_at = [], None
     with training(name, arguments) as run:
@@ -170,7 +170,7 @@ class Examiner:
         """The newest policy's figures."""
         import jax
 
-        from attjax import checkpoint
+        from attjax.runs import checkpoint
         from attjax.runs import folder as run_folder
 
         update = checkpoint.latest(self._folder)

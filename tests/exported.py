@@ -19,11 +19,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import AttitudeEnv, assembly, checkpoint, export_c, flight_check, provenance
+from attjax import AttitudeEnv, assembly, export_c, flight_check, provenance
 from attjax.control import time_optimal
 from attjax.flight_check import Decisions
 from attjax.flight_policy import FlightPolicy
 from attjax.ppo.networks import Policy
+from attjax.runs import checkpoint
 from attjax.runs import folder as run_folder
 from attjax.spacecraft import LM50
 

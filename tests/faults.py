@@ -167,7 +167,7 @@ FAULTS = {
         "(params.rate_limit + kick)", ["tests/test_observation_space.py"],
     ),
     "optimizer not restored": (
-        "attjax/checkpoint.py", "    return restored.replace(key=",
+        "attjax/runs/checkpoint.py", "    return restored.replace(key=",
         "    return restored.replace(optimizer=template.optimizer, key=", RUNS,
     ),
     "rows after the checkpoint kept": (

@@ -89,7 +89,7 @@ class Run:
         """All arrays of the newest checkpoint by name, and the metrics but the clock."""
         import orbax.checkpoint as ocp
 
-        from attjax import checkpoint
+        from attjax.runs import checkpoint
 
         path = self._folder / str(checkpoint.latest(self._folder)) / "learner"
         with ocp.PyTreeCheckpointer() as checkpointer:
@@ -129,7 +129,7 @@ class Run:
             assert f"resumed at {self._newest * 128:,} agent steps" in output, output
 
     def _check_nothing_lost(self):
-        from attjax import checkpoint
+        from attjax.runs import checkpoint
 
         if not (self._folder / "config.json").exists():
             return -1

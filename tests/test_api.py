@@ -8,12 +8,13 @@ import pytest
 from commands import STEPS_PER_UPDATE, TINY, eval_script, run
 
 import attjax
-from attjax import LM50, AttitudeEnv, Spacecraft, checkpoint
+from attjax import LM50, AttitudeEnv, Spacecraft
 from attjax.config.presets import PAPER_FAST
 from attjax.control import classical
 from attjax.errors import UserError
 from attjax.keeper import Place
 from attjax.run import Diverged
+from attjax.runs import checkpoint
 from attjax.runs.folder import FolderError
 
 SMALL = {

@@ -7,9 +7,8 @@ import pytest
 from commands import STEPS_PER_UPDATE, train_script
 from test_checkpoint import CONFIG
 
-from attjax import checkpoint
 from attjax.config import run as run_config
-from attjax.runs import belongings
+from attjax.runs import belongings, checkpoint
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
 

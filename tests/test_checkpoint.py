@@ -5,10 +5,11 @@ import jax
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, assembly, checkpoint, ppo
+from attjax import AttitudeEnv, assembly, ppo
 from attjax.config import presets
 from attjax.config.run import Config
 from attjax.ppo import train_state
+from attjax.runs import checkpoint
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
 

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 from commands import ROOT, STEPS_PER_UPDATE, TINY, eval_script, one_line_error, run, train_script
 
-from attjax import checkpoint, evaluation
+from attjax import evaluation
 from attjax.control import classical
 from attjax.ppo import train_state
+from attjax.runs import checkpoint
 from attjax.runs import folder as run_folder
 
 

@@ -5,8 +5,9 @@ import numpy as np
 from commands import STEPS_PER_UPDATE, TINY, run
 from setups import small_attitude_setup
 
-from attjax import assembly, checkpoint
+from attjax import assembly
 from attjax.ppo import train_state
+from attjax.runs import checkpoint
 
 
 def test_reporting_and_saving_do_not_change_the_run(trained, tmp_path):

@@ -9,8 +9,9 @@ import pytest
 from commands import TINY, eval_script, export_script, train_script
 from test_checkpoint import CONFIG, SETTINGS
 
-from attjax import assembly, checkpoint, export_c
+from attjax import assembly, export_c
 from attjax.ppo import train_state
+from attjax.runs import checkpoint
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
 

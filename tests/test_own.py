@@ -7,10 +7,11 @@ import jax
 import pytest
 from commands import ROOT, STEPS_PER_UPDATE, TINY, eval_script, one_line_error, run, train_script
 
-from attjax import AttitudeEnv, assembly, checkpoint
+from attjax import AttitudeEnv, assembly
 from attjax.config import presets, user_functions
 from attjax.config.user_functions import FunctionError
 from attjax.envs.reward import logarithmic_reward
+from attjax.runs import checkpoint
 from attjax.runs import folder as run_folder
 
 EXAMPLES = ROOT / "docs" / "examples"

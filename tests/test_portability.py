@@ -8,10 +8,11 @@ import pytest
 from commands import TINY, run
 from test_checkpoint import SETTINGS
 
-from attjax import AttitudeEnv, assembly, checkpoint, ppo, step
+from attjax import AttitudeEnv, assembly, ppo, step
 from attjax.config import run as run_config
 from attjax.ppo import train_state
 from attjax.ppo.networks import Policy
+from attjax.runs import checkpoint
 from attjax.runs import folder as run_folder
 
 

@@ -5,8 +5,9 @@ from pathlib import Path
 import jax
 import pytest
 
-from attjax import AttitudeEnv, checkpoint, evaluation
+from attjax import AttitudeEnv, evaluation
 from attjax.evaluation.tables import PAPER_TABLE_2
+from attjax.runs import checkpoint
 
 FOLDER = Path(__file__).parent.parent / "pretrained" / "precise"
 

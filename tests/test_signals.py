@@ -8,7 +8,7 @@ import threading
 import pytest
 from commands import ROOT, TINY, train_script
 
-from attjax import checkpoint
+from attjax.runs import checkpoint
 
 HEARD = ["SIGINT", "SIGTERM", "SIGHUP", "SIGUSR1", "SIGUSR2", "SIGXCPU"]
 STOP = """

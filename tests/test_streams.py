@@ -9,7 +9,7 @@ import sys
 import pytest
 from commands import ROOT, STEPS_PER_UPDATE, TINY
 
-from attjax import checkpoint
+from attjax.runs import checkpoint
 
 FULL = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
 UNBUFFERED = pytest.mark.parametrize("unbuffered", ["", "1"])

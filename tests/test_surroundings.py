@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from commands import STEPS_PER_UPDATE, TINY, python, run
 
-from attjax import checkpoint, jax_setup
+from attjax import jax_setup
+from attjax.runs import checkpoint
 
 HOSTILE = {
     "JAX_CHECK_TRACER_LEAKS": "1", "JAX_DEBUG_INFS": "1", "JAX_DEBUG_KEY_REUSE": "1",

@@ -196,8 +196,8 @@ def _check_duration(duration, frameskip):
 def _controller(name, arguments, spacecraft):
     import jax
 
-    from attjax import checkpoint
     from attjax.control import classical as controllers
+    from attjax.runs import checkpoint
 
     if name != POLICY:
         return jax.tree_util.Partial(controllers.CONTROLLERS[name])

@@ -95,9 +95,10 @@ def _module(name):
 
 def _flight_policy(arguments):
     # Imported late: with them, --help and errors in the arguments would take seconds.
-    from attjax import checkpoint, provenance
+    from attjax import provenance
     from attjax.envs.attitude import AttitudeEnv
     from attjax.flight_policy import FlightPolicy
+    from attjax.runs import checkpoint
 
     folder = arguments.checkpoint
     config = run_folder.read_config(folder)
