@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from attjax import canvas, metrics
+from attjax import canvas
+from attjax.runs import metrics
 
 PAPERS_PLATEAU = 2500
 

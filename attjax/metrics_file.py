@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from attjax import metrics
 from attjax.runs import folder as run_folder
+from attjax.runs import metrics
 
 NEEDED = {"agent_steps", "wall_s"}
 """Columns that every row has had from the first version on; those that came later may lack."""

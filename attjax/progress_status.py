@@ -3,8 +3,8 @@
 import collections
 from typing import Any
 
-from attjax import metrics
-from attjax.metrics import Metric
+from attjax.runs import metrics
+from attjax.runs.metrics import Metric
 
 WINDOW_S = 60.0
 """Speed and remaining time come from the blocks of so many seconds."""
