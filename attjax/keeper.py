@@ -5,11 +5,11 @@ import importlib
 import time
 from pathlib import Path
 
-from attjax import assembly, metrics_file
+from attjax import assembly
 from attjax.config import run as run_config
 from attjax.errors import UserError
 from attjax.run import Run
-from attjax.runs import checkpoint
+from attjax.runs import checkpoint, metrics_file
 from attjax.runs import folder as run_folder
 
 

@@ -6,13 +6,13 @@ from collections.abc import Callable
 import jax
 import numpy as np
 
-from attjax import assembly, metrics_file, nan_search, ppo
+from attjax import assembly, nan_search, ppo
 from attjax.config.fields import frameskip_to_judge
 from attjax.config.run import Config
 from attjax.envs.attitude import AttitudeEnv
 from attjax.ppo import train_state as learner
 from attjax.ppo.train_state import Learner, Setup
-from attjax.runs import metrics
+from attjax.runs import metrics, metrics_file
 
 
 class Diverged(Exception):

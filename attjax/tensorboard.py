@@ -17,9 +17,8 @@ from tensorboardX.proto.summary_pb2 import Summary
 from tensorboardX.record_writer import masked_crc32c
 from tensorboardX.summary import hparams
 
-from attjax import metrics_file
 from attjax.config import run as run_config
-from attjax.runs import belongings, metrics
+from attjax.runs import belongings, metrics, metrics_file
 from attjax.runs import folder as run_folder
 
 RATE = "time/steps_per_s"

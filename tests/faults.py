@@ -171,7 +171,7 @@ FAULTS = {
         "    return restored.replace(optimizer=template.optimizer, key=", RUNS,
     ),
     "rows after the checkpoint kept": (
-        "attjax/metrics_file.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
+        "attjax/runs/metrics_file.py", 'if int(row["agent_steps"]) <= resume_at', "if True", RUNS,
     ),
     "no lock on the folder": (
         "attjax/runs/folder.py", "fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,

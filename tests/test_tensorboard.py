@@ -14,8 +14,7 @@ import pytest
 from commands import ROOT, STEPS_PER_UPDATE, TINY, one_line_error, run, train_script
 from test_checkpoint import CONFIG
 
-from attjax import metrics_file
-from attjax.runs import checkpoint, metrics
+from attjax.runs import checkpoint, metrics, metrics_file
 from attjax.runs import folder as run_folder
 
 pytest.importorskip("tensorboardX")

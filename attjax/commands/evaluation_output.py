@@ -90,6 +90,6 @@ def draw(flight: Any, rows: list[dict], folder: Path) -> list[Path]:
 
 def metrics_rows(folder: Path) -> list[dict]:
     """The rows of a run's metrics.csv, for the learning curve."""
-    from attjax import metrics_file
+    from attjax.runs import metrics_file
 
     return metrics_file.read_rows(folder / run_folder.METRICS)
