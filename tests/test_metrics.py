@@ -82,7 +82,8 @@ def test_a_metric_of_the_registry_is_a_curve_in_tensorboard(two_more, tmp_path):
 
 def test_a_metric_of_the_registry_is_in_the_figure(two_more, tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
-    from attjax import canvas, learning_curve
+    from attjax import canvas
+    from attjax.runs import learning_curve
 
     figures = []
     monkeypatch.setattr(canvas, "save", lambda figure, *_: figures.append(figure))

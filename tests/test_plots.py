@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 from matplotlib import image
 
-from attjax import AttitudeEnv, evaluation, learning_curve
+from attjax import AttitudeEnv, evaluation
 from attjax.control import classical, time_optimal
 from attjax.control.classical import average_torque
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.simulator import EnvState
 from attjax.evaluation import plots
+from attjax.runs import learning_curve
 
 ENV = AttitudeEnv(frameskip=5)
 CONTROLLER = jax.tree_util.Partial(classical.phase_plane)

@@ -81,8 +81,8 @@ def draw(flight: Any, rows: list[dict], folder: Path) -> list[Path]:
     Returns:
         The files written.
     """
-    from attjax import learning_curve
     from attjax.evaluation import plots
+    from attjax.runs import learning_curve
 
     written = plots.write_all(flight, folder)
     return written + learning_curve.write(rows, flight.is_the_papers, folder)
