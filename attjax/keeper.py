@@ -81,7 +81,7 @@ class Keeper:
         self.run.go_on_from(saved, file.kept, file.wall_s)
         self._logs = [file]
         if place.tensorboard:
-            from attjax import tensorboard
+            from attjax.runs import tensorboard
 
             self._logs.append(tensorboard.EventFile(folder, config, file.kept))
         if self.lengthened_from is not None:

@@ -72,7 +72,7 @@ def test_a_metric_of_the_registry_is_a_curve_in_tensorboard(two_more, tmp_path):
     pytest.importorskip("tensorboardX")
     from test_tensorboard import CONFIG, compared, points
 
-    from attjax import tensorboard
+    from attjax.runs import tensorboard
 
     tensorboard.EventFile(tmp_path, CONFIG, []).append(row_of_two_more())
     found = points(tmp_path)
