@@ -8,8 +8,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from attjax.progress_status import Status
 from attjax.runs import metrics
+from attjax.runs.progress_status import Status
 
 WIDTHS = (25, 16, 24)
 """Of the columns that cells have their places in, without the course that the first one draws."""

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.live import Live
 
 from attjax.panel import Panel
-from attjax.progress_status import Status, line
+from attjax.runs.progress_status import Status, line
 from attjax.signals import StopSignals
 
 REDRAWS_PER_S = 2

@@ -11,10 +11,10 @@ from commands import ROOT
 from rich.console import Console
 from setups import small_attitude_setup
 
-from attjax import assembly, panel, ppo, progress_status
+from attjax import assembly, panel, ppo
 from attjax.ppo import train_state
 from attjax.runs import folder as run_folder
-from attjax.runs import metrics, metrics_file
+from attjax.runs import metrics, metrics_file, progress_status
 
 EPISODE = metrics.Metric(
     name="closest_deg", meaning="a mean over episodes", mean_of="closest_deg",

@@ -14,8 +14,8 @@ import pytest
 from commands import ROOT
 from rich.console import Console
 
-from attjax import panel, progress, progress_status
-from attjax.runs import metrics
+from attjax import panel, progress
+from attjax.runs import metrics, progress_status
 
 LOSSES = {
     "entropy": 2.345, "approximate_kl": 0.00123, "clip_fraction": 0.043, "policy_loss": -0.01,
