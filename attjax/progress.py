@@ -7,7 +7,7 @@ from typing import Any, Self
 from rich.console import Console
 from rich.live import Live
 
-from attjax.panel import Panel
+from attjax.runs.progress_panel import Panel
 from attjax.runs.progress_status import Status, line
 from attjax.signals import StopSignals
 

@@ -11,10 +11,10 @@ from commands import ROOT
 from rich.console import Console
 from setups import small_attitude_setup
 
-from attjax import assembly, panel, ppo
+from attjax import assembly, ppo
 from attjax.ppo import train_state
 from attjax.runs import folder as run_folder
-from attjax.runs import metrics, metrics_file, progress_status
+from attjax.runs import metrics, metrics_file, progress_panel, progress_status
 
 EPISODE = metrics.Metric(
     name="closest_deg", meaning="a mean over episodes", mean_of="closest_deg",
@@ -54,7 +54,7 @@ def test_a_metric_of_the_registry_is_on_the_panel_and_in_the_lines(two_more):
     status.start(0.0)
     status.add(row_of_two_more(), 1.0)
     console = Console(width=80, record=True, force_terminal=True, file=io.StringIO())
-    console.print(panel.Panel(status))
+    console.print(progress_panel.Panel(status))
     lines = console.export_text().splitlines()
     assert len(lines) == 5
     assert re.fullmatch(r"closest +12.5° ▁ {26,}gradient +0.50", lines[4])
@@ -65,7 +65,7 @@ def test_a_metric_of_the_registry_is_on_the_panel_and_in_the_lines(two_more):
 def test_every_cell_has_a_place_of_its_own_on_the_panel():
     places = [metric.cell.place for metric in metrics.METRICS if metric.cell]
     assert len(set(places)) == len(places)
-    assert max(column for column, _ in places) < len(panel.WIDTHS)
+    assert max(column for column, _ in places) < len(progress_panel.WIDTHS)
 
 
 def test_a_metric_of_the_registry_is_a_curve_in_tensorboard(two_more, tmp_path):

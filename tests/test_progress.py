@@ -14,8 +14,8 @@ import pytest
 from commands import ROOT
 from rich.console import Console
 
-from attjax import panel, progress
-from attjax.runs import metrics, progress_status
+from attjax import progress
+from attjax.runs import metrics, progress_panel, progress_status
 
 LOSSES = {
     "entropy": 2.345, "approximate_kl": 0.00123, "clip_fraction": 0.043, "policy_loss": -0.01,
@@ -59,7 +59,7 @@ def screen(view, width):
 def test_the_panel_at_80_columns(clock):
     rows = [row(4e6 * i, **EPISODES | {"episode_return": 500.0 * i}) for i in range(1, 6)]
     clock[0] = 1005.0
-    lines = screen(panel.Panel(status(*rows)), 80)
+    lines = screen(progress_panel.Panel(status(*rows)), 80)
     assert len(lines) == 4 and max(map(len, lines)) <= 78
     assert re.fullmatch(r"━+[╸╺]?━*  50.0%  20M/40M steps  4M/s  ETA 0:05 *", lines[0])
     assert re.fullmatch(r"return +2,500 ▁▂▄▆█ +entropy +2.35 +value loss +1.23e-05", lines[1])
@@ -70,7 +70,7 @@ def test_the_panel_at_80_columns(clock):
 @pytest.mark.parametrize("width", [20, 30, 40, 60, 72, 79, 80, 100, 200])
 @pytest.mark.parametrize("values", [EPISODES, WORST, {}])
 def test_the_panel_fits_any_width(clock, width, values):
-    lines = screen(panel.Panel(status(row(4e6, **values), row(8e6))), width)
+    lines = screen(progress_panel.Panel(status(row(4e6, **values), row(8e6))), width)
     assert len(lines) == 4
     assert max(map(len, lines)) <= width - 2
     if values and width > 30:
@@ -81,16 +81,16 @@ def test_the_panel_fits_any_width(clock, width, values):
 
 
 def test_the_panel_has_nothing_to_say_at_first(clock):
-    lines = screen(panel.Panel(status()), 80)
+    lines = screen(progress_panel.Panel(status()), 80)
     assert "–/s  ETA –" in lines[0] and "first block" in lines[1]
-    lines = screen(panel.Panel(status(row(4e6))), 80)
+    lines = screen(progress_panel.Panel(status(row(4e6))), 80)
     assert "no whole episode" in lines[1] and "has ended yet" in lines[2]
     assert "return" not in "".join(lines) and "success" not in "".join(lines)
 
 
 def test_values_stay_until_there_are_new_ones(clock):
     shown = status(row(4e6, **EPISODES), row(8e6))
-    assert "98.4%" in "".join(screen(panel.Panel(shown), 80))
+    assert "98.4%" in "".join(screen(progress_panel.Panel(shown), 80))
     assert "success 98.4%" in progress_status.line(shown, 1002.0)
 
 
@@ -105,7 +105,7 @@ def test_a_run_that_goes_on_shows_what_it_knew():
 def test_numbers_that_are_not_finite(clock, bad):
     values = dict.fromkeys((*LOSSES, *EPISODES), bad)
     shown = status(row(4e6, **values), row(8e6, **EPISODES), row(12e6, **values))
-    assert str(bad) in screen(panel.Panel(shown), 80)[3]
+    assert str(bad) in screen(progress_panel.Panel(shown), 80)[3]
     assert f"terminal error {bad}°" in progress_status.line(shown, 1003.0)
 
 
@@ -242,9 +242,9 @@ def test_a_pipe_gets_lines(forced):
 
 
 def test_a_trend_of_few_many_and_equal_values():
-    assert panel.trend([], 4) == "    "
-    assert panel.trend([3], 4) == "▁   "
-    assert panel.trend([2, 2, 2], 4) == "▁▁▁ "
-    assert panel.trend([0, 1], 4) == "▁█  "
-    assert panel.trend(list(range(1000)), 8) == panel.LEVELS
-    assert panel.trend([100, 10, 1], 3) == "█▄▁"  # by the logarithm
+    assert progress_panel.trend([], 4) == "    "
+    assert progress_panel.trend([3], 4) == "▁   "
+    assert progress_panel.trend([2, 2, 2], 4) == "▁▁▁ "
+    assert progress_panel.trend([0, 1], 4) == "▁█  "
+    assert progress_panel.trend(list(range(1000)), 8) == progress_panel.LEVELS
+    assert progress_panel.trend([100, 10, 1], 3) == "█▄▁"  # by the logarithm
