@@ -14,8 +14,7 @@ import pytest
 from commands import ROOT
 from rich.console import Console
 
-from attjax import progress
-from attjax.runs import metrics, progress_panel, progress_status
+from attjax.runs import metrics, progress, progress_panel, progress_status
 
 LOSSES = {
     "entropy": 2.345, "approximate_kl": 0.00123, "clip_fraction": 0.043, "policy_loss": -0.01,
@@ -171,7 +170,7 @@ SHOW = f"""
 import sys, time
 sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests")!r}]
 from test_progress import row, EPISODES
-from attjax import progress
+from attjax.runs import progress
 with progress.Progress(1000, 0) as view:
     for steps in range(100, 1001, 100):
         view.show(row(steps, **EPISODES))
