@@ -247,7 +247,7 @@ sys.exit(train.main(sys.argv[1:]))
 def test_a_second_signal_ends_the_process_at_once(tmp_path):
     code = """
 import os, signal
-from attjax import signals
+from attjax.runs import signals
 with signals.StopSignals() as stop:
     os.kill(os.getpid(), signal.SIGTERM)
     assert stop.received == signal.SIGTERM

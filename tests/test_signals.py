@@ -13,7 +13,7 @@ from attjax.runs import checkpoint
 HEARD = ["SIGINT", "SIGTERM", "SIGHUP", "SIGUSR1", "SIGUSR2", "SIGXCPU"]
 STOP = """
 import os, signal, sys
-from attjax import signals
+from attjax.runs import signals
 with signals.StopSignals() as stop:
     for name in sys.argv[1:]:
         os.kill(os.getpid(), getattr(signal, name))

@@ -3,10 +3,11 @@
 import argparse
 from collections.abc import Sequence
 
-from attjax import devices, errors, signals
+from attjax import devices, errors
 from attjax.config import arguments as cli
 from attjax.config import fields, presets, toml
 from attjax.config import run as run_config
+from attjax.runs import signals
 
 USAGE = "%(prog)s [--preset NAME] [--checkpoint FOLDER] [--resume] [FLAG ...]"
 EXAMPLES = """\

@@ -6,7 +6,7 @@ from attjax.config.settings import Settings
 from attjax.ppo import train_state
 from attjax.run import Diverged, Run
 from attjax.runs.progress import Progress
-from attjax.signals import StopSignals
+from attjax.runs.signals import StopSignals
 from attjax.training import Observer
 
 DIVERGED = 3

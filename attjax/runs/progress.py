@@ -9,7 +9,7 @@ from rich.live import Live
 
 from attjax.runs.progress_panel import Panel
 from attjax.runs.progress_status import Status, line
-from attjax.signals import StopSignals
+from attjax.runs.signals import StopSignals
 
 REDRAWS_PER_S = 2
 LEAST_PAUSE_S, PAUSE_SHARE = 5.0, 0.01
