@@ -5,11 +5,10 @@ import importlib
 import time
 from pathlib import Path
 
-from attjax import assembly
 from attjax.config import run as run_config
 from attjax.errors import UserError
 from attjax.run import Run
-from attjax.runs import checkpoint, metrics_file
+from attjax.runs import build, checkpoint, metrics_file
 from attjax.runs import folder as run_folder
 
 
@@ -65,12 +64,12 @@ class Keeper:
         if place.resume and run_folder.holds_run(folder):
             old = run_folder.read_config(folder)
             config = run_config.lengthened(old, given)
-            self.run = Run(config, assembly.of_config(config))
+            self.run = Run(config, build.of_config(config))
             self.lengthened_from = old.settings if config != old else None
         else:
             config = run_config.new(**given)
             # Before a run gives way to this one: it fails where a user's function cannot be used.
-            setup = assembly.of_config(config)
+            setup = build.of_config(config)
             run_folder.create(folder, config, place.overwrite)
             self.run = Run(config, setup)
         saved = self.run.learner

@@ -6,13 +6,13 @@ from collections.abc import Callable
 import jax
 import numpy as np
 
-from attjax import assembly, nan_search, ppo
+from attjax import nan_search, ppo
 from attjax.config.fields import frameskip_to_judge
 from attjax.config.run import Config
 from attjax.envs.attitude import AttitudeEnv
 from attjax.ppo import train_state as learner
 from attjax.ppo.train_state import Learner, Setup
-from attjax.runs import metrics, metrics_file
+from attjax.runs import build, metrics, metrics_file
 
 
 class Diverged(Exception):
@@ -34,7 +34,7 @@ class Run:
 
     def __init__(self, config: Config, setup: Setup):
         self.config, self.setup = config, setup
-        self.env_params = assembly.env_params(setup)
+        self.env_params = build.env_params(setup)
         self.learner = learner.init(setup, self.env_params, jax.random.key(config.seed))
         self.update, self.rows, self.wall_s, self._clock = 0, [], 0.0, None
 

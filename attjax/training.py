@@ -4,11 +4,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from attjax import assembly
 from attjax.config import run as run_config
 from attjax.config.settings import Settings
 from attjax.keeper import Keeper, Place
 from attjax.run import Diverged, Run
+from attjax.runs import build
 from attjax.runs import folder as run_folder
 from attjax.spacecraft import Spacecraft
 
@@ -94,7 +94,7 @@ def train(
         callback = Observer() if callback is None else _Callback(callback)
     if folder is None:
         config = run_config.new(**given)
-        run = Run(config, assembly.of_config(config))
+        run = Run(config, build.of_config(config))
         callback.started(run, None)
         _train(run, callback, None, debug_nans)
         return run

@@ -125,14 +125,15 @@ def train(hidden_sizes: list[int], minibatch_size: int, cores: int) -> dict:
     """Throughput of training with the default preset, in blocks of one update."""
     import jax
 
-    from attjax import assembly, ppo
+    from attjax import ppo
     from attjax.config import presets
     from attjax.ppo import train_state
+    from attjax.runs import build
 
     changes = {"hidden_sizes": tuple(hidden_sizes), "minibatch_size": minibatch_size}
     settings = presets.PRECISE.replace(**changes)
-    setup = assembly.setup(settings, num_devices=cores)
-    env_params = assembly.env_params(setup)
+    setup = build.setup(settings, num_devices=cores)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     durations = []
     for _ in range(1 + TRAINING_BLOCKS):

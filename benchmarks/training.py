@@ -128,13 +128,14 @@ def prepare_attjax(workload: Workload):
     """A function that runs one update of train.py's program."""
     import jax
 
-    from attjax import assembly, ppo
+    from attjax import ppo
     from attjax.config import presets
     from attjax.ppo import train_state
+    from attjax.runs import build
 
     settings = presets.PAPER_FAST.replace(**dataclasses.asdict(workload))
-    setup = assembly.setup(settings)
-    env_params = assembly.env_params(setup)
+    setup = build.setup(settings)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     train_block = ppo.train_block.lower(setup, env_params, state, 1).compile()
 

@@ -19,12 +19,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import AttitudeEnv, assembly, export_c, flight_check, provenance
+from attjax import AttitudeEnv, export_c, flight_check, provenance
 from attjax.control import time_optimal
 from attjax.flight_check import Decisions
 from attjax.flight_policy import FlightPolicy
 from attjax.ppo.networks import Policy
-from attjax.runs import checkpoint
+from attjax.runs import build, checkpoint
 from attjax.runs import folder as run_folder
 from attjax.spacecraft import LM50
 
@@ -44,7 +44,7 @@ def load(folder: Path, frameskip: int) -> FlightPolicy:
 def untrained(features, hidden_sizes, rate_margin, spacecraft=LM50) -> FlightPolicy:
     """Random weights, and biases too, that leave the decision to the state."""
     policy = Policy(features, hidden_sizes, spacecraft.num_actions, rate_margin)
-    shapes = jax.eval_shape(lambda: assembly.initial_parameters(policy)["policy"])
+    shapes = jax.eval_shape(lambda: build.initial_parameters(policy)["policy"])
     leaves, tree = jax.tree.flatten(shapes)
     rng = np.random.default_rng(5)
     leaves = [rng.normal(0, (0.1, 1.0)[x.ndim - 1], x.shape).astype(np.float32) for x in leaves]

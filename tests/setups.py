@@ -4,10 +4,11 @@ import functools
 
 from jax.sharding import PartitionSpec
 
-from attjax import assembly, sharding
+from attjax import sharding
 from attjax.config import presets
 from attjax.ppo import train_state
 from attjax.ppo.rollout import rollout
+from attjax.runs import build
 
 SMALL = {
     "num_envs": 64,
@@ -29,7 +30,7 @@ def settings(updates, preset=presets.PAPER_FAST, **overrides):
 
 def small_attitude_setup(updates, preset=presets.PRECISE, **overrides):
     overrides = {"frameskips": (5, 20)} | overrides
-    return assembly.setup(settings(updates, preset, **overrides))
+    return build.setup(settings(updates, preset, **overrides))
 
 
 def fly(setup, env_params, state):

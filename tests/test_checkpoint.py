@@ -5,11 +5,11 @@ import jax
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, assembly, ppo
+from attjax import AttitudeEnv, ppo
 from attjax.config import presets
 from attjax.config.run import Config
 from attjax.ppo import train_state
-from attjax.runs import checkpoint
+from attjax.runs import build, checkpoint
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
 
@@ -29,8 +29,8 @@ def trained(tmp_path_factory):
     """A run folder with one checkpoint, and the learner saved in it."""
     folder = tmp_path_factory.mktemp("run")
     run_folder.create(folder, CONFIG, overwrite=False)
-    setup = assembly.setup(SETTINGS)
-    env_params = assembly.env_params(setup)
+    setup = build.setup(SETTINGS)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(3))
     state, _ = ppo.train_block(setup, env_params, state, 2)
     with checkpoint.Saver(folder) as saver:
@@ -61,7 +61,7 @@ def test_restored_learner_is_the_saved_one_and_goes_on_bitwise(trained):
 def test_a_run_goes_on_with_another_number_of_devices(trained):
     folder, setup, env_params, state = trained
     setup = dataclasses.replace(setup, num_devices=2)
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     template = train_state.init(setup, env_params, jax.random.key(99))
     restored = checkpoint.restore_learner(folder, template)
     jax.tree.map(np.testing.assert_array_equal, restored.params, state.params)

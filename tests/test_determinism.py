@@ -5,9 +5,8 @@ import numpy as np
 from commands import STEPS_PER_UPDATE, TINY, run
 from setups import small_attitude_setup
 
-from attjax import assembly
 from attjax.ppo import train_state
-from attjax.runs import checkpoint
+from attjax.runs import build, checkpoint
 
 
 def test_reporting_and_saving_do_not_change_the_run(trained, tmp_path):
@@ -22,7 +21,7 @@ def test_reporting_and_saving_do_not_change_the_run(trained, tmp_path):
 
 def test_the_seed_reaches_everything_random():
     setup = small_attitude_setup(updates=1)
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     a, b, again = (train_state.init(setup, env_params, jax.random.key(seed)) for seed in (0, 1, 0))
     jax.tree.map(np.testing.assert_array_equal, a.params, again.params)
     jax.tree.map(np.testing.assert_array_equal, a.states, again.states)

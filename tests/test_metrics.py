@@ -11,10 +11,10 @@ from commands import ROOT
 from rich.console import Console
 from setups import small_attitude_setup
 
-from attjax import assembly, ppo
+from attjax import ppo
 from attjax.ppo import train_state
+from attjax.runs import build, metrics, metrics_file, progress_panel, progress_status
 from attjax.runs import folder as run_folder
-from attjax.runs import metrics, metrics_file, progress_panel, progress_status
 
 EPISODE = metrics.Metric(
     name="closest_deg", meaning="a mean over episodes", mean_of="closest_deg",
@@ -105,7 +105,7 @@ def test_rows_of_before_a_metric_are_read_and_gone_on_from(tmp_path, monkeypatch
 
 def test_training_makes_the_numbers_of_the_registry_and_no_others():
     setup = small_attitude_setup(1)
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     _, block = ppo.train_block.eval_shape(setup, env_params, state, 1)
     of_means = {metric.name for metric in metrics.METRICS if metric.mean_of}

@@ -9,9 +9,9 @@ import pytest
 from commands import TINY, eval_script, export_script, train_script
 from test_checkpoint import CONFIG, SETTINGS
 
-from attjax import assembly, export_c
+from attjax import export_c
 from attjax.ppo import train_state
-from attjax.runs import checkpoint
+from attjax.runs import build, checkpoint
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
 
@@ -23,8 +23,8 @@ NAMES = [
 
 @pytest.fixture(scope="module")
 def state():
-    setup = assembly.setup(SETTINGS)
-    return train_state.init(setup, assembly.env_params(setup), jax.random.key(3))
+    setup = build.setup(SETTINGS)
+    return train_state.init(setup, build.env_params(setup), jax.random.key(3))
 
 
 @pytest.mark.parametrize("name", NAMES, ids=map(ascii, NAMES))

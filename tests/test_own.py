@@ -7,11 +7,11 @@ import jax
 import pytest
 from commands import ROOT, STEPS_PER_UPDATE, TINY, eval_script, one_line_error, run, train_script
 
-from attjax import AttitudeEnv, assembly
+from attjax import AttitudeEnv
 from attjax.config import presets, user_functions
 from attjax.config.user_functions import FunctionError
 from attjax.envs.reward import logarithmic_reward
-from attjax.runs import checkpoint
+from attjax.runs import build, checkpoint
 from attjax.runs import folder as run_folder
 
 EXAMPLES = ROOT / "docs" / "examples"
@@ -53,7 +53,7 @@ def test_the_users_functions_are_what_learns(monkeypatch):
     """The reward that reaches the learner and the network's inputs are the user's."""
     monkeypatch.syspath_prepend(str(EXAMPLES))
     settings = presets.PRECISE.replace(reward="rewards:frugal", features="rewards:with_momentum")
-    env, policy = (getattr(assembly.setup(settings), name) for name in ("env", "policy"))
+    env, policy = (getattr(build.setup(settings), name) for name in ("env", "policy"))
     params = env.default_params
     observation, state = env.reset(jax.random.key(0), params)
     assert policy.encode(observation, env.context(params)).features.shape == (60,)

@@ -8,11 +8,11 @@ import pytest
 from commands import TINY, run
 from test_checkpoint import SETTINGS
 
-from attjax import AttitudeEnv, assembly, ppo, step
+from attjax import AttitudeEnv, ppo, step
 from attjax.config import run as run_config
 from attjax.ppo import train_state
 from attjax.ppo.networks import Policy
-from attjax.runs import checkpoint
+from attjax.runs import build, checkpoint
 from attjax.runs import folder as run_folder
 
 
@@ -40,7 +40,7 @@ def test_policy_and_value_ask_for_full_precision_products(features):
     """GPUs multiply float32 in tf32, with ten bits, unless asked; that costs the last decades."""
     env, policy = AttitudeEnv(5), Policy(features, rate_margin=0.99)
     context = env.context(env.default_params)
-    params = assembly.initial_parameters(policy)
+    params = build.initial_parameters(policy)
     observation = jnp.zeros(11).at[3].set(1.0)
 
     def evaluate(observation):
@@ -55,13 +55,13 @@ def test_policy_and_value_ask_for_full_precision_products(features):
 
 
 def test_a_run_on_two_devices_goes_on_on_one(tmp_path):
-    setup = assembly.setup(SETTINGS, num_devices=2)
-    state = train_state.init(setup, assembly.env_params(setup), jax.random.key(0))
+    setup = build.setup(SETTINGS, num_devices=2)
+    state = train_state.init(setup, build.env_params(setup), jax.random.key(0))
     run_folder.create(tmp_path, run_config.Config("precise", 0, SETTINGS), overwrite=False)
     with checkpoint.Saver(tmp_path) as saver:
         saver.save(state)
-    setup = assembly.setup(SETTINGS)
-    env_params = assembly.env_params(setup)
+    setup = build.setup(SETTINGS)
+    env_params = build.env_params(setup)
     template = train_state.init(setup, env_params, jax.random.key(1))
     restored = checkpoint.restore_learner(tmp_path, template)
     jax.tree.map(np.testing.assert_array_equal, restored.params, state.params)

@@ -9,11 +9,12 @@ from jax.sharding import PartitionSpec
 from probes import Probe
 from setups import fly, settings, small_attitude_setup
 
-from attjax import AttitudeEnv, assembly, ppo, sharding
+from attjax import AttitudeEnv, ppo, sharding
 from attjax.config import presets
 from attjax.ppo import train_state
 from attjax.ppo import update as descent
 from attjax.ppo.networks import Policy
+from attjax.runs import build
 
 
 def train(setup, env_params):
@@ -86,7 +87,7 @@ def test_a_short_training_improves_the_return():
         reward_scale=0.01,
         minibatch_size=512,
     )
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     returns = []
     for _ in range(4):
@@ -101,7 +102,7 @@ def test_a_short_training_improves_the_return():
 
 def test_one_compilation_serves_blocks_of_any_length():
     setup = small_attitude_setup(10)
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     before = ppo.train_block._cache_size()
     for length in (1, 2, 3):
@@ -112,7 +113,7 @@ def test_one_compilation_serves_blocks_of_any_length():
 
 def test_blocks_of_any_length_give_the_same_bits():
     setup = small_attitude_setup(4)
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     results = []
     for lengths in ((4,), (1, 3)):
         state = train_state.init(setup, env_params, jax.random.key(7))
@@ -144,7 +145,7 @@ def test_entropy_bonus_anneals_over_the_whole_run():
 
 def test_entropy_bonus_is_what_its_weight_takes_off_the_loss():
     setup = small_attitude_setup(1)
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     params = train_state.init(setup, env_params, jax.random.key(0)).params
     context = AttitudeEnv(5).context(AttitudeEnv(5).default_params)
     observation = jnp.zeros((5, 11)).at[:, 8].set(jnp.linspace(0, 0.3, 5))
@@ -160,7 +161,7 @@ def test_entropy_bonus_is_what_its_weight_takes_off_the_loss():
 @pytest.mark.parametrize("spoiled", ["observations", "parameters"])
 def test_divergence_names_its_first_update(spoiled):
     setup = small_attitude_setup(4)
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     if spoiled == "observations":
         states = state.states
@@ -176,14 +177,14 @@ def test_divergence_names_its_first_update(spoiled):
 
 def test_healthy_runs_do_not_diverge():
     setup = small_attitude_setup(2)
-    _, metrics = train(setup, assembly.env_params(setup))
+    _, metrics = train(setup, build.env_params(setup))
     assert {int(update) for update in metrics["diverged"].values()} == {-1}
 
 
 def test_two_devices_take_the_gradient_step_of_one():
     """One minibatch holds all samples, so their order and their halves do not matter."""
     one = small_attitude_setup(1, frameskips=(20,), minibatch_size=64 * 16, passes=1)
-    env_params = assembly.env_params(one)
+    env_params = build.env_params(one)
     _, steps = fly(one, env_params, train_state.init(one, env_params, jax.random.key(0)))
     steps = jax.tree.map(np.asarray, steps)
     results = []
@@ -211,6 +212,6 @@ def on_samples(setup, env_params, state, steps):
 
 def test_small_minibatches_are_not_shared_out():
     assert len(jax.devices()) == 2
-    assert assembly.num_devices(presets.PRECISE) == 2
-    assert assembly.num_devices(presets.PAPER_FAST) == 1
-    assert assembly.num_devices(presets.PRECISE.replace(num_envs=2047)) == 1
+    assert build.num_devices(presets.PRECISE) == 2
+    assert build.num_devices(presets.PAPER_FAST) == 1
+    assert build.num_devices(presets.PRECISE.replace(num_envs=2047)) == 1

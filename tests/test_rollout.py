@@ -9,17 +9,18 @@ import pytest
 from setups import fly, small_attitude_setup
 
 import attjax
-from attjax import assembly, ppo
+from attjax import ppo
 from attjax.config import presets
 from attjax.ppo import train, train_state
 from attjax.ppo.rollout import encode, episode_sums, greedy_rows, sample
+from attjax.runs import build
 
 
 def test_spacecraft_are_shared_out_among_the_control_rates():
     setup = small_attitude_setup(1, frameskips=(5, 7, 10, 14, 20))
     sizes = [group.stop - group.start for group in setup.slices]
     assert sum(sizes) == 64 and set(sizes) == {12, 13}
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     discounts = train.discounts(setup.env, env_params, setup.settings.ppo, 64)
     features = encode(setup.env, setup.policy, env_params, jnp.zeros((64, 11))).features
     for frameskip, group in zip((5, 7, 10, 14, 20), setup.slices):
@@ -36,17 +37,17 @@ def test_every_control_rate_has_spacecraft_on_any_number_of_devices(monkeypatch)
             settings = presets.PRECISE.replace(
                 num_envs=num_envs, rollout_length=4096, minibatch_size=4096
             )
-            setup = assembly.setup(settings, num_devices=assembly.num_devices(settings))
+            setup = build.setup(settings, num_devices=build.num_devices(settings))
             assert all(group.start < group.stop for group in setup.slices), (devices, num_envs)
     settings = settings.replace(num_envs=6)
     with pytest.raises(ValueError, match="num_devices is 2, for 3 spacecraft each; they must be"):
-        assembly.setup(settings, num_devices=2)
+        build.setup(settings, num_devices=2)
 
 
 def test_rollout_and_gradient_steps_each_leave_a_fresh_key():
     """A key used twice, in a rollout and for its shuffles, would tie them to each other."""
     setup = small_attitude_setup(2)
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     flown, _ = fly(setup, env_params, state)
     keys = [np.array(jax.random.key_data(x.key)) for x in (state, flown)]
@@ -58,7 +59,7 @@ def test_rollout_and_gradient_steps_each_leave_a_fresh_key():
 @pytest.mark.parametrize("share", [0.0, 0.125])
 def test_a_share_of_the_spacecraft_acts_greedily(share):
     setup = small_attitude_setup(1, greedy_share=share)
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     _, steps = fly(setup, env_params, state)
     log_probabilities = jax.vmap(setup.policy.log_probabilities, (None, 0))(
@@ -84,7 +85,7 @@ def test_only_whole_episodes_count_in_the_metrics():
         near_goal_steps=3,
         stagger_episodes=False,
     )
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     _, steps = fly(setup, env_params, state)
     assert not steps.terminated.any()
@@ -102,16 +103,16 @@ def test_only_whole_episodes_count_in_the_metrics():
 def test_training_episodes_are_capped_in_agent_steps():
     """The slow rates keep their 43.75 s, the fast ones are cut; the paper's are untouched."""
     setup = small_attitude_setup(1, frameskips=(5, 7, 10, 14, 20), max_episode_steps=700)
-    limits = assembly.env_params(setup).max_steps_in_episode
+    limits = build.env_params(setup).max_steps_in_episode
     for limit, group in zip([700, 700, 700, 700, 500], setup.slices):
         assert set(limits[group].tolist()) == {limit}
-    paper = assembly.setup(presets.PAPER)
-    assert assembly.env_params(paper).max_steps_in_episode == 500
+    paper = build.setup(presets.PAPER)
+    assert build.env_params(paper).max_steps_in_episode == 500
 
 
 def test_staggered_episodes_start_at_random_times():
     staggered = small_attitude_setup(1, near_goal_share=0.0)
-    env_params = assembly.env_params(staggered)
+    env_params = build.env_params(staggered)
     times = train_state.init(staggered, env_params, jax.random.key(0)).states.time
     assert len(set(times.tolist())) > 5 and int(times.max()) < 700
     together = dataclasses.replace(
@@ -134,7 +135,7 @@ def test_sampled_actions_follow_their_probabilities_and_never_the_mask():
 def test_every_spacecraft_and_device_draws_its_own_numbers(num_devices):
     setup = small_attitude_setup(1, near_goal_share=0.0, greedy_share=0.0)
     setup = dataclasses.replace(setup, num_devices=num_devices)
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     assert len(np.unique(state.states.quaternion[:, 3])) == 64
     _, steps = fly(setup, env_params, state)
@@ -145,7 +146,7 @@ def test_every_spacecraft_and_device_draws_its_own_numbers(num_devices):
 def test_devices_hold_the_control_rates_of_their_part():
     """Row i of a device steps with the control period that the policy is told."""
     setup = dataclasses.replace(small_attitude_setup(1, near_goal_share=0.0), num_devices=2)
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     before = state.states
     _, steps = fly(setup, env_params, state)
@@ -164,7 +165,7 @@ def test_the_learner_sees_the_reward_times_its_scale(scale):
     setup = small_attitude_setup(
         1, presets.PAPER_FAST, frameskips=(20,), rollout_length=2, reward_scale=scale
     )
-    env_params = assembly.env_params(setup)
+    env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     _, steps = fly(setup, env_params, state)
     assert np.ptp(steps.score[0]) > 0.1

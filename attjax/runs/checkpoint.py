@@ -17,10 +17,9 @@ import jax
 import numpy as np
 import orbax.checkpoint as ocp
 
-from attjax import assembly
 from attjax.ppo.networks import Policy
 from attjax.ppo.train_state import Learner
-from attjax.runs import belongings, quiet
+from attjax.runs import belongings, build, quiet
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
 
@@ -221,8 +220,8 @@ def restore_network(folder: Path, update: int | None = None) -> tuple[Policy, di
         FolderError: as :func:`restore_policy`.
     """
     config = run_folder.read_config(folder)
-    policy = assembly.policy(config.settings, config.spacecraft)
-    initial = functools.partial(assembly.initial_parameters, policy, config.spacecraft)
+    policy = build.policy(config.settings, config.spacecraft)
+    initial = functools.partial(build.initial_parameters, policy, config.spacecraft)
     template = jax.eval_shape(initial)["policy"]
     params = _restore(folder, latest(folder) if update is None else update, "policy", template)
     return policy, {"policy": params}
