@@ -6,13 +6,14 @@ from collections.abc import Callable
 import jax
 import numpy as np
 
-from attjax import nan_search, ppo
+from attjax import ppo
 from attjax.config.fields import frameskip_to_judge
 from attjax.config.run import Config
 from attjax.envs.attitude import AttitudeEnv
 from attjax.ppo import train_state as learner
 from attjax.ppo.train_state import Learner, Setup
 from attjax.runs import build, metrics, metrics_file
+from attjax.runs import debug_nans as nan_search
 
 
 class Diverged(Exception):
