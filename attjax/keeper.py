@@ -7,9 +7,9 @@ from pathlib import Path
 
 from attjax.config import run as run_config
 from attjax.errors import UserError
-from attjax.run import Run
 from attjax.runs import build, checkpoint, metrics_file
 from attjax.runs import folder as run_folder
+from attjax.runs.run import Run
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

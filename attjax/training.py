@@ -7,9 +7,9 @@ from pathlib import Path
 from attjax.config import run as run_config
 from attjax.config.settings import Settings
 from attjax.keeper import Keeper, Place
-from attjax.run import Diverged, Run
 from attjax.runs import build
 from attjax.runs import folder as run_folder
+from attjax.runs.run import Diverged, Run
 from attjax.spacecraft import Spacecraft
 
 
@@ -74,7 +74,7 @@ def train(
         settings: by name, in place of the preset's: any of ``train.py --help``.
 
     Returns:
-        The run: ``policy``, ``metrics``, ``env``, and all else of :class:`attjax.run.Run`.
+        The run: ``policy``, ``metrics``, ``env``, and all else of :class:`attjax.runs.run.Run`.
 
     Raises:
         ValueError: something given is not as said.

@@ -13,9 +13,9 @@ from attjax.config.presets import PAPER_FAST
 from attjax.control import classical
 from attjax.errors import UserError
 from attjax.keeper import Place
-from attjax.run import Diverged
 from attjax.runs import checkpoint
 from attjax.runs.folder import FolderError
+from attjax.runs.run import Diverged
 
 SMALL = {
     "frameskips": (5, 20), "num_envs": 16, "rollout_length": 8, "minibatch_size": 32,

@@ -89,7 +89,7 @@ def _train(given, place, stop, arguments):
     from attjax import training
     from attjax.commands import training_output
     from attjax.keeper import Place
-    from attjax.run import Diverged
+    from attjax.runs.run import Diverged
 
     place = Place(**place)
     view = training_output.Terminal(place.folder, device, stop)

@@ -4,8 +4,8 @@ from attjax import errors
 from attjax.config import arguments
 from attjax.config.settings import Settings
 from attjax.ppo import train_state
-from attjax.run import Diverged, Run
 from attjax.runs.progress import Progress
+from attjax.runs.run import Diverged, Run
 from attjax.runs.signals import StopSignals
 from attjax.training import Observer
 
