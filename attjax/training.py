@@ -6,9 +6,9 @@ from pathlib import Path
 
 from attjax.config import run as run_config
 from attjax.config.settings import Settings
-from attjax.keeper import Keeper, Place
 from attjax.runs import build
 from attjax.runs import folder as run_folder
+from attjax.runs.keeper import Keeper, Place
 from attjax.runs.run import Diverged, Run
 from attjax.spacecraft import Spacecraft
 

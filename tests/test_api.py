@@ -12,9 +12,9 @@ from attjax import LM50, AttitudeEnv, Spacecraft
 from attjax.config.presets import PAPER_FAST
 from attjax.control import classical
 from attjax.errors import UserError
-from attjax.keeper import Place
 from attjax.runs import checkpoint
 from attjax.runs.folder import FolderError
+from attjax.runs.keeper import Place
 from attjax.runs.run import Diverged
 
 SMALL = {

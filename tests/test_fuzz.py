@@ -13,9 +13,9 @@ from fuzzing import FUZZ, Accepted, content, refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from attjax import keeper
 from attjax.config import presets
 from attjax.config.settings import FIELDS
+from attjax.runs import keeper
 
 NUMBERS = st.one_of(
     st.integers(-3, 3),

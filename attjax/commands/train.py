@@ -88,7 +88,7 @@ def _train(given, place, stop, arguments):
     # Imported late: with them, --help and errors in the arguments would take seconds.
     from attjax import training
     from attjax.commands import training_output
-    from attjax.keeper import Place
+    from attjax.runs.keeper import Place
     from attjax.runs.run import Diverged
 
     place = Place(**place)
