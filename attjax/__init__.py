@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from attjax.envs.simulator import EnvParams, EnvState, step
     from attjax.evaluation import evaluate
     from attjax.runs.checkpoint import load_policy
+    from attjax.runs.trainer import train
     from attjax.spacecraft import LM50, Spacecraft
-    from attjax.training import train
 
 __all__ = [
     "LM50",
@@ -36,7 +36,7 @@ _MODULES = {
     "load_policy": "attjax.runs.checkpoint",
     "open_loop": "attjax.envs.batch",
     "step": "attjax.envs.simulator",
-    "train": "attjax.training",
+    "train": "attjax.runs.trainer",
 }
 
 

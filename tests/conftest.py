@@ -4,9 +4,10 @@ import pytest
 from commands import STEPS_PER_UPDATE, TINY, run
 from fuzzing import Accepted
 
-from attjax import evaluation, training
+from attjax import evaluation
 from attjax.commands import training_output
 from attjax.evaluation.playback import page as playback
+from attjax.runs import trainer
 
 jax.config.update("jax_num_cpu_devices", 2)  # what is shared out over devices is tested on two
 jax.config.update("jax_legacy_prng_key", "error")  # typed keys throughout
@@ -43,7 +44,7 @@ def no_work(monkeypatch):
         raise Accepted
 
     monkeypatch.setattr(evaluation, "fly", accept)
-    monkeypatch.setattr(training, "_train", accept)
+    monkeypatch.setattr(trainer, "_train", accept)
     monkeypatch.setattr(training_output.Terminal, "started", lambda *_: None)
 
 

@@ -86,8 +86,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _train(given, place, stop, arguments):
     device = devices.select_device(arguments.device)
     # Imported late: with them, --help and errors in the arguments would take seconds.
-    from attjax import training
     from attjax.commands import training_output
+    from attjax.runs import trainer
     from attjax.runs.keeper import Place
     from attjax.runs.run import Diverged
 
@@ -96,7 +96,7 @@ def _train(given, place, stop, arguments):
     advice = "fewer --num-envs or a shorter --rollout-length take less"
     try:
         with errors.enough_memory(advice):
-            run = training.train(
+            run = trainer.train(
                 **given, folder=place, callback=view, debug_nans=arguments.debug_nans
             )
     except Diverged as error:

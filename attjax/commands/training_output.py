@@ -7,7 +7,7 @@ from attjax.ppo import train_state
 from attjax.runs.progress import Progress
 from attjax.runs.run import Diverged, Run
 from attjax.runs.signals import StopSignals
-from attjax.training import Observer
+from attjax.runs.trainer import Observer
 
 DIVERGED = 3
 
