@@ -8,14 +8,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import provenance
 from attjax.control import assurance
 from attjax.control.assurance import RateMask
 from attjax.envs import observation as observations
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
+from attjax.export import provenance
+from attjax.export.provenance import Origin
 from attjax.ppo.networks import Policy
-from attjax.provenance import Origin
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,7 +87,7 @@ class FlightPolicy:
 
     @property
     def facts(self) -> dict[str, str]:
-        """What an exported file says of itself: :func:`attjax.provenance.facts`."""
+        """What an exported file says of itself: :func:`attjax.export.provenance.facts`."""
         parameters = parameter_hash(self.params)
         return provenance.facts(self.origin, self.env.frameskip, self.env.spacecraft, parameters)
 

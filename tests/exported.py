@@ -19,8 +19,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import AttitudeEnv, export_c, flight_check, provenance
+from attjax import AttitudeEnv, export_c, flight_check
 from attjax.control import time_optimal
+from attjax.export import provenance
 from attjax.flight_check import Decisions
 from attjax.flight_policy import FlightPolicy
 from attjax.ppo.networks import Policy

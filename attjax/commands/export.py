@@ -95,8 +95,8 @@ def _module(name):
 
 def _flight_policy(arguments):
     # Imported late: with them, --help and errors in the arguments would take seconds.
-    from attjax import provenance
     from attjax.envs.attitude import AttitudeEnv
+    from attjax.export import provenance
     from attjax.flight_policy import FlightPolicy
     from attjax.runs import checkpoint
 

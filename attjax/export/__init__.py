@@ -1,0 +1,1 @@
+"""Policies for flight software: C99, ONNX, StableHLO."""
