@@ -11,7 +11,7 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 import attjax
-from attjax import c_names
+from attjax.export import c_names
 from attjax.export_inputs import FORMS
 from attjax.flight_policy import FlightPolicy
 from attjax.ppo import networks

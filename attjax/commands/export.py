@@ -5,9 +5,10 @@ import contextlib
 import importlib
 from collections.abc import Sequence
 
-from attjax import c_names, destinations, devices, errors
+from attjax import destinations, devices, errors
 from attjax.config import arguments as cli
 from attjax.config import fields
+from attjax.export import c_names
 from attjax.runs import folder as run_folder
 
 FORMATS = {
