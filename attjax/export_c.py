@@ -4,8 +4,8 @@ from string import Template
 
 import numpy as np
 
-from attjax import c_text, flight_check, template
-from attjax.export import c_names
+from attjax import flight_check, template
+from attjax.export import c_names, c_text
 from attjax.export_inputs import FORMS, CInputs
 from attjax.flight_policy import FlightPolicy
 

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from attjax import c_text
-from attjax.c_text import Expression
 from attjax.control import features
 from attjax.control.features import Multiscale
 from attjax.dynamics import quaternion as quaternions
+from attjax.export import c_text
+from attjax.export.c_text import Expression
 
 
 class CInputs(NamedTuple):
