@@ -6,8 +6,8 @@ import numpy as np
 
 from attjax import flight_check, template
 from attjax.export import c_names, c_text
+from attjax.export.flight_policy import FlightPolicy
 from attjax.export_inputs import FORMS, CInputs
-from attjax.flight_policy import FlightPolicy
 
 TEMPLATES = "export/templates"
 POLICY_FILES = ("attjax_policy.h", "attjax_policy.c")

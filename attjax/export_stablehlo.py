@@ -23,9 +23,8 @@ import jax
 import jax.export
 import jax.numpy as jnp
 
-from attjax import flight_policy
-from attjax.export import c_names
-from attjax.flight_policy import FlightPolicy
+from attjax.export import c_names, flight_policy
+from attjax.export.flight_policy import FlightPolicy
 
 FILES = ("attjax_policy.jax", "attjax_policy.stablehlo", "attjax_policy.txt")
 PLATFORMS = ("cpu", "cuda")

@@ -7,10 +7,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import evaluation, flight_policy
+from attjax import evaluation
 from attjax.control import time_optimal
 from attjax.dynamics import quaternion as quaternions
-from attjax.flight_policy import FlightPolicy
+from attjax.export import flight_policy
+from attjax.export.flight_policy import FlightPolicy
 from attjax.ppo import networks
 
 TIE = 1e-4

@@ -22,8 +22,8 @@ import numpy as np
 from attjax import AttitudeEnv, export_c, flight_check
 from attjax.control import time_optimal
 from attjax.export import provenance
+from attjax.export.flight_policy import FlightPolicy
 from attjax.flight_check import Decisions
-from attjax.flight_policy import FlightPolicy
 from attjax.ppo.networks import Policy
 from attjax.runs import build, checkpoint
 from attjax.runs import folder as run_folder

@@ -12,7 +12,7 @@ from bodies import rotated_inertia
 from commands import ROOT, export_script, one_line_error
 
 from attjax import export_c, flight_check
-from attjax.flight_policy import FlightPolicy
+from attjax.export.flight_policy import FlightPolicy
 from attjax.spacecraft import Spacecraft
 
 PRECISE = ROOT / "pretrained" / "precise"

@@ -98,7 +98,7 @@ def _flight_policy(arguments):
     # Imported late: with them, --help and errors in the arguments would take seconds.
     from attjax.envs.attitude import AttitudeEnv
     from attjax.export import provenance
-    from attjax.flight_policy import FlightPolicy
+    from attjax.export.flight_policy import FlightPolicy
     from attjax.runs import checkpoint
 
     folder = arguments.checkpoint
