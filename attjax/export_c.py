@@ -4,8 +4,8 @@ from string import Template
 
 import numpy as np
 
-from attjax import flight_check, template
-from attjax.export import c_names, c_text
+from attjax import template
+from attjax.export import c_names, c_text, flight_check
 from attjax.export.flight_policy import FlightPolicy
 from attjax.export_inputs import FORMS, CInputs
 

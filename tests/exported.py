@@ -19,11 +19,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import AttitudeEnv, export_c, flight_check
+from attjax import AttitudeEnv, export_c
 from attjax.control import time_optimal
-from attjax.export import provenance
+from attjax.export import flight_check, provenance
+from attjax.export.flight_check import Decisions
 from attjax.export.flight_policy import FlightPolicy
-from attjax.flight_check import Decisions
 from attjax.ppo.networks import Policy
 from attjax.runs import build, checkpoint
 from attjax.runs import folder as run_folder

@@ -10,10 +10,11 @@ from own_environment import BIAS, BRAKE, Weak
 from pages import embedded
 
 import attjax
-from attjax import AttitudeEnv, EnvState, Spacecraft, evaluation, flight_check
+from attjax import AttitudeEnv, EnvState, Spacecraft, evaluation
 from attjax.envs import simulator
 from attjax.evaluation import plots
 from attjax.evaluation.playback import page as playback
+from attjax.export import flight_check
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
