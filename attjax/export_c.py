@@ -7,7 +7,7 @@ import numpy as np
 from attjax import template
 from attjax.export import c_names, c_text, flight_check
 from attjax.export.flight_policy import FlightPolicy
-from attjax.export_inputs import FORMS, CInputs
+from attjax.export.inputs import FORMS, CInputs
 
 TEMPLATES = "export/templates"
 POLICY_FILES = ("attjax_policy.h", "attjax_policy.c")

@@ -13,7 +13,7 @@ from onnx import TensorProto, helper, numpy_helper
 import attjax
 from attjax.export import c_names
 from attjax.export.flight_policy import FlightPolicy
-from attjax.export_inputs import FORMS
+from attjax.export.inputs import FORMS
 from attjax.ppo import networks
 
 FILES = ("attjax_policy.onnx",)

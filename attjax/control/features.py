@@ -92,4 +92,4 @@ def multiscale_features(observation: chex.Array, context: Context) -> chex.Array
 
 
 FEATURES = {"state": state_features, "multiscale": multiscale_features}
-"""The inputs that have a name; attjax.export_inputs writes them down for C and ONNX."""
+"""The inputs that have a name; attjax.export.inputs writes them down for C and ONNX."""
