@@ -19,8 +19,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax import AttitudeEnv, export_c
+from attjax import AttitudeEnv
 from attjax.control import time_optimal
+from attjax.export import c as export_c
 from attjax.export import flight_check, provenance
 from attjax.export.flight_check import Decisions
 from attjax.export.flight_policy import FlightPolicy

@@ -11,7 +11,7 @@ import pytest
 from bodies import rotated_inertia
 from commands import ROOT, export_script, one_line_error
 
-from attjax import export_c
+from attjax.export import c as export_c
 from attjax.export import flight_check
 from attjax.export.flight_policy import FlightPolicy
 from attjax.spacecraft import Spacecraft

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from commands import ROOT, export_script, one_line_error
 
-from attjax import export_c
+from attjax.export import c as export_c
 from attjax.export import flight_check
 from attjax.spacecraft import Spacecraft
 

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from commands import ROOT, eval_script, export_script
 
-from attjax import AttitudeEnv, export_c
+from attjax import AttitudeEnv
+from attjax.export import c as export_c
 from attjax.export import flight_check, flight_policy
 from attjax.export.flight_policy import FlightPolicy
 from attjax.spacecraft import Spacecraft

@@ -9,7 +9,7 @@ import pytest
 from commands import TINY, eval_script, export_script, train_script
 from test_checkpoint import CONFIG, SETTINGS
 
-from attjax import export_c
+from attjax.export import c as export_c
 from attjax.ppo import train_state
 from attjax.runs import build, checkpoint
 from attjax.runs import folder as run_folder

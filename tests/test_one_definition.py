@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from test_export import needs_compiler, random_states
 
-from attjax import export_c
 from attjax.config import settings
 from attjax.control import assurance, features
 from attjax.control.features import Multiscale
 from attjax.dynamics import quaternion
+from attjax.export import c as export_c
 from attjax.export import inputs as export_inputs
 
 KINEMATICS, RATE_MASK = quaternion.derivative, assurance.rate_mask

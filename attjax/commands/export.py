@@ -12,7 +12,7 @@ from attjax.export import c_names
 from attjax.runs import folder as run_folder
 
 FORMATS = {
-    "c": "attjax.export_c",
+    "c": "attjax.export.c",
     "onnx": "attjax.export_onnx",
     "stablehlo": "attjax.export_stablehlo",
 }
