@@ -172,7 +172,8 @@ def main(argv=None) -> int:
 
 
 def _report(arguments, frameskip):
-    from attjax import export_onnx, export_stablehlo
+    from attjax import export_stablehlo
+    from attjax.export import onnx as export_onnx
 
     flight = load(arguments.checkpoint, frameskip)
     states = flight_check.flown_decisions(flight, arguments.seed, SLEWS, arguments.states // SLEWS)

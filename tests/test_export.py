@@ -157,7 +157,7 @@ def test_exports_are_the_same_each_time():
 
 
 def test_onnx_decides_as_jax():
-    export_onnx = pytest.importorskip("attjax.export_onnx", exc_type=ImportError)
+    export_onnx = pytest.importorskip("attjax.export.onnx", exc_type=ImportError)
     pytest.importorskip("onnxruntime")
     for flight, states in cases():
         model = export_onnx.files(flight)[export_onnx.FILES[0]]

@@ -64,7 +64,7 @@ def test_c_files_say_whether_their_rate_was_trained(tmp_path, capsys, frameskip,
 
 def test_onnx_and_stablehlo_say_the_same():
     flight = exported.load(PRECISE, 12)
-    export_onnx = pytest.importorskip("attjax.export_onnx", exc_type=ImportError)
+    export_onnx = pytest.importorskip("attjax.export.onnx", exc_type=ImportError)
     export_stablehlo = pytest.importorskip("attjax.export_stablehlo", exc_type=ImportError)
     model = export_onnx.model(flight)
     assert {x.key: x.value for x in model.metadata_props} == flight.facts

@@ -87,7 +87,7 @@ def test_a_change_reaches_c(changed, tmp_path):
 
 
 def test_a_change_reaches_onnx(changed):
-    export_onnx = pytest.importorskip("attjax.export_onnx", exc_type=ImportError)
+    export_onnx = pytest.importorskip("attjax.export.onnx", exc_type=ImportError)
     pytest.importorskip("onnxruntime")
     flight, states = changed
     action, logits = exported.onnx_outputs(export_onnx.files(flight)[export_onnx.FILES[0]], states)

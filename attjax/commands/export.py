@@ -13,7 +13,7 @@ from attjax.runs import folder as run_folder
 
 FORMATS = {
     "c": "attjax.export.c",
-    "onnx": "attjax.export_onnx",
+    "onnx": "attjax.export.onnx",
     "stablehlo": "attjax.export_stablehlo",
 }
 NEEDED = {"onnx": "onnx", "stablehlo": "flatbuffers"}
