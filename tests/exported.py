@@ -172,8 +172,8 @@ def main(argv=None) -> int:
 
 
 def _report(arguments, frameskip):
-    from attjax import export_stablehlo
     from attjax.export import onnx as export_onnx
+    from attjax.export import stablehlo as export_stablehlo
 
     flight = load(arguments.checkpoint, frameskip)
     states = flight_check.flown_decisions(flight, arguments.seed, SLEWS, arguments.states // SLEWS)

@@ -168,7 +168,7 @@ def test_onnx_decides_as_jax():
 
 
 def test_stablehlo_decides_as_jax():
-    export_stablehlo = pytest.importorskip("attjax.export_stablehlo", exc_type=ImportError)
+    export_stablehlo = pytest.importorskip("attjax.export.stablehlo", exc_type=ImportError)
     for flight, states in cases():
         program = export_stablehlo.files(flight)[export_stablehlo.FILES[0]]
         action, logits = exported.stablehlo_outputs(program, states)

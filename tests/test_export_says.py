@@ -65,7 +65,7 @@ def test_c_files_say_whether_their_rate_was_trained(tmp_path, capsys, frameskip,
 def test_onnx_and_stablehlo_say_the_same():
     flight = exported.load(PRECISE, 12)
     export_onnx = pytest.importorskip("attjax.export.onnx", exc_type=ImportError)
-    export_stablehlo = pytest.importorskip("attjax.export_stablehlo", exc_type=ImportError)
+    export_stablehlo = pytest.importorskip("attjax.export.stablehlo", exc_type=ImportError)
     model = export_onnx.model(flight)
     assert {x.key: x.value for x in model.metadata_props} == flight.facts
     text = export_stablehlo.files(flight)["attjax_policy.txt"]
@@ -188,7 +188,7 @@ def test_the_c_test_program_flies_slews_that_are_the_spacecrafts_task(angles):
 
 
 def test_the_bytecode_takes_a_state_and_nothing_else():
-    export_stablehlo = pytest.importorskip("attjax.export_stablehlo", exc_type=ImportError)
+    export_stablehlo = pytest.importorskip("attjax.export.stablehlo", exc_type=ImportError)
     flight = exported.load(PRECISE, 5)
     bytecode = export_stablehlo.files(flight)["attjax_policy.stablehlo"]
     module, main = exported.stablehlo_main(bytecode)
@@ -203,7 +203,7 @@ def test_the_bytecode_takes_a_state_and_nothing_else():
 
 
 def test_exports_name_no_folder_of_the_machine_that_wrote_them():
-    export_stablehlo = pytest.importorskip("attjax.export_stablehlo", exc_type=ImportError)
+    export_stablehlo = pytest.importorskip("attjax.export.stablehlo", exc_type=ImportError)
     contents = export_stablehlo.files(exported.load(PRECISE, 5))
     for content in contents.values():
         data = content if isinstance(content, bytes) else content.encode()

@@ -14,7 +14,7 @@ from attjax.runs import folder as run_folder
 FORMATS = {
     "c": "attjax.export.c",
     "onnx": "attjax.export.onnx",
-    "stablehlo": "attjax.export_stablehlo",
+    "stablehlo": "attjax.export.stablehlo",
 }
 NEEDED = {"onnx": "onnx", "stablehlo": "flatbuffers"}
 USAGE = "%(prog)s --format FORMAT --out FOLDER [--checkpoint FOLDER] [FLAG ...]"
