@@ -4,7 +4,7 @@ from string import Template
 
 import numpy as np
 
-from attjax import template
+from attjax import resources
 from attjax.export import c_names, c_text, flight_check
 from attjax.export.flight_policy import FlightPolicy
 from attjax.export.inputs import FORMS, CInputs
@@ -212,5 +212,5 @@ def _numbers(values):
 
 def _fill(name, prefix, values):
     """A template with these values; the template's own names, no user's, get the prefix."""
-    text = c_names.renamed(template.read(f"{TEMPLATES}/{name}"), prefix)
+    text = c_names.renamed(resources.read(f"{TEMPLATES}/{name}"), prefix)
     return Template(text).substitute(values)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import attjax
-from attjax import evaluation, template
+from attjax import evaluation, resources
 from attjax.control import time_optimal
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
@@ -64,11 +64,11 @@ def page(
         "slews": _slew_names(start),
         "flights": [[_encoded(one) for one in slew] for slew in zip(*histories)],
     }
-    scripts = "\n".join(template.read(f"{TEMPLATES}/{name}.js") for name in SCRIPTS)
+    scripts = "\n".join(resources.read(f"{TEMPLATES}/{name}.js") for name in SCRIPTS)
     # "<" would let a name end the element that holds it.
     flights = json.dumps(content).replace("<", "\\u003c")
-    style = template.read(f"{TEMPLATES}/page.css")
-    return template.fill(f"{TEMPLATES}/page.html", style=style, script=scripts, flights=flights)
+    style = resources.read(f"{TEMPLATES}/page.css")
+    return resources.fill(f"{TEMPLATES}/page.html", style=style, script=scripts, flights=flights)
 
 
 def _starts(env, params, key) -> EnvState:
