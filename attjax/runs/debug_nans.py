@@ -8,7 +8,7 @@ from jax.experimental import checkify
 
 from attjax import ppo
 
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).parents[1]
 
 
 class NotFinite(Exception):
