@@ -193,7 +193,7 @@ if hasattr(os, "register_at_fork"):
 
 def _rendering():
     try:
-        from attjax import rendering
+        from attjax.wrappers import rendering
     except ModuleNotFoundError:
         raise DependencyNotInstalled(
             "render_mode='rgb_array' needs matplotlib: install attjax[plot]"

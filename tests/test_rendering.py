@@ -5,8 +5,9 @@ import matplotlib
 import numpy as np
 import pytest
 
-from attjax import AttitudeEnv, rendering
+from attjax import AttitudeEnv
 from attjax.dynamics import quaternion
+from attjax.wrappers import rendering
 
 PARAMS = AttitudeEnv().default_params
 HALF = rendering.WIDTH // 2
