@@ -15,10 +15,16 @@ from attjax import checks
 from attjax.envs.attitude import AttitudeEnv, steps_key
 from attjax.envs.reward import Transition
 from attjax.envs.simulator import EnvParams
-from attjax.gymnasium_task import Options, Task, check_not_forked, outer_time_limit, random_key
 from attjax.gymnasium_vector import SlewVectorEnv
 from attjax.values import integer
 from attjax.wrappers import compiled
+from attjax.wrappers.gymnasium.task import (
+    Options,
+    Task,
+    check_not_forked,
+    outer_time_limit,
+    random_key,
+)
 
 __all__ = ["ID", "SlewEnv", "SlewVectorEnv"]
 

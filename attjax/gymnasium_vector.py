@@ -6,9 +6,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from attjax import checks
-from attjax.gymnasium_task import Options, Task, check_not_forked, random_key, starting_key
 from attjax.values import integer
 from attjax.wrappers import compiled
+from attjax.wrappers.gymnasium.task import Options, Task, check_not_forked, random_key, starting_key
 
 EACH_ITS_OWN = ("action_masks", "render")
 """Methods whose result has a part for each spacecraft."""

@@ -1,0 +1,1 @@
+"""The slew task under Gymnasium."""
