@@ -15,7 +15,6 @@ from attjax import checks
 from attjax.envs.attitude import AttitudeEnv, steps_key
 from attjax.envs.reward import Transition
 from attjax.envs.simulator import EnvParams
-from attjax.gymnasium_vector import SlewVectorEnv
 from attjax.values import integer
 from attjax.wrappers import compiled
 from attjax.wrappers.gymnasium.task import (
@@ -25,6 +24,7 @@ from attjax.wrappers.gymnasium.task import (
     outer_time_limit,
     random_key,
 )
+from attjax.wrappers.gymnasium.vector import SlewVectorEnv
 
 __all__ = ["ID", "SlewEnv", "SlewVectorEnv"]
 

@@ -8,7 +8,7 @@ gymnasium = pytest.importorskip("gymnasium", minversion="1.4")
 torch = pytest.importorskip("torch")
 
 from attjax.gymnasium_env import ID  # noqa: E402
-from attjax.gymnasium_vector import SlewVectorEnv  # noqa: E402
+from attjax.wrappers.gymnasium.vector import SlewVectorEnv  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
