@@ -65,7 +65,7 @@ def _add_make_vec(found, absent):
     except ImportError:
         absent[MAKE_VEC] = "not installed (pip install gymnasium)"
         return
-    name = importlib.import_module("attjax.gymnasium_env").ID
+    name = importlib.import_module("attjax.wrappers.gymnasium").ID
 
     def build(num_envs):
         envs = gymnasium.make_vec(name, num_envs=num_envs)

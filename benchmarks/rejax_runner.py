@@ -6,7 +6,7 @@ from contenders import Workload, serve
 
 from attjax import AttitudeEnv
 from attjax.config.presets import PAPER_FAST
-from attjax.gymnax_compat import FiveValueEnv
+from attjax.wrappers.gymnax import FiveValueEnv
 
 
 def prepare(workload: Workload):

@@ -5,7 +5,7 @@ import torch
 from contenders import Workload, serve
 from stable_baselines3 import PPO
 
-import attjax.gymnasium_env
+import attjax.wrappers.gymnasium
 from attjax.config.presets import PAPER_FAST
 from attjax.sb3 import as_vec_env
 
@@ -16,7 +16,7 @@ def environment(num_envs: int):
     The time limit counts as an end, as in the paper, which also spares SB3 a call of the value
     network for each.
     """
-    vector_env = gymnasium.make_vec(attjax.gymnasium_env.ID, num_envs=num_envs)
+    vector_env = gymnasium.make_vec(attjax.wrappers.gymnasium.ID, num_envs=num_envs)
     return as_vec_env(vector_env, PAPER_FAST.task.reward_scale, time_limit_terminates=True)
 
 

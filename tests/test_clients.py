@@ -7,8 +7,7 @@ import pytest
 gymnasium = pytest.importorskip("gymnasium", minversion="1.4")
 torch = pytest.importorskip("torch")
 
-from attjax.gymnasium_env import ID  # noqa: E402
-from attjax.wrappers.gymnasium.vector import SlewVectorEnv  # noqa: E402
+from attjax.wrappers.gymnasium import ID, SlewVectorEnv  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 

@@ -13,8 +13,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
 from gymnasium.wrappers import vector as wrappers  # noqa: E402
 
 from attjax import AttitudeEnv, EnvState  # noqa: E402
-from attjax.gymnasium_env import ID, SlewEnv, SlewVectorEnv  # noqa: E402
 from attjax.wrappers import compiled as programs  # noqa: E402
+from attjax.wrappers.gymnasium import ID, SlewEnv, SlewVectorEnv  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("error")
 SAME_STEP = {"autoreset_mode": AutoresetMode.SAME_STEP}

@@ -12,7 +12,7 @@ from gymnasium.error import DependencyNotInstalled, ResetNeeded  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 import attjax  # noqa: E402
-from attjax.gymnasium_env import ID, SlewEnv, SlewVectorEnv  # noqa: E402
+from attjax.wrappers.gymnasium import ID, SlewEnv, SlewVectorEnv  # noqa: E402
 
 MAKERS = {"make": gymnasium.make, "make_vec": lambda id, **o: gymnasium.make_vec(id, 2, **o)}
 each = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
@@ -73,9 +73,9 @@ def test_stepping_on_after_the_end_can_be_drawn():
 
 def test_a_missing_package_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    for name in ("rendering", "canvas"):  # as if neither had been imported before
-        monkeypatch.delitem(sys.modules, f"attjax.{name}", raising=False)
-        monkeypatch.delattr(attjax, name, raising=False)
+    for package, name in ((attjax.wrappers, "rendering"), (attjax, "canvas")):  # as if not imported
+        monkeypatch.delitem(sys.modules, f"{package.__name__}.{name}", raising=False)
+        monkeypatch.delattr(package, name, raising=False)
     for make in (SlewEnv, SlewVectorEnv):
         make()
         with pytest.raises(DependencyNotInstalled, match=r"^render_mode='rgb_array' needs mat"):

@@ -16,7 +16,7 @@ from gymnasium.wrappers import TimeLimit  # noqa: E402
 
 from attjax import AttitudeEnv  # noqa: E402
 from attjax.control import assurance  # noqa: E402
-from attjax.gymnasium_env import ID, SlewEnv  # noqa: E402
+from attjax.wrappers.gymnasium import ID, SlewEnv  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("error")
 LIMITED = {
@@ -114,7 +114,7 @@ def test_masks_are_those_of_the_rate_mask(margin):
 
 
 def test_the_module_may_be_named_in_the_id():
-    code = f"import gymnasium; print(gymnasium.make('attjax.gymnasium_env:{ID}').spec.id)"
+    code = f"import gymnasium; print(gymnasium.make('attjax.wrappers.gymnasium:{ID}').spec.id)"
     assert python(code).stdout.strip() == ID
 
 
@@ -122,9 +122,8 @@ ASYNC = """
 import gymnasium, multiprocessing, sys
 if __name__ == "__main__":
     {before}
-    envs = gymnasium.make_vec(
-        "attjax.gymnasium_env:attjax/Slew-v0", 2, "async", vector_kwargs={{"context": "{context}"}}
-    )
+    name = "attjax.wrappers.gymnasium:attjax/Slew-v0"
+    envs = gymnasium.make_vec(name, 2, "async", vector_kwargs={{"context": "{context}"}})
     print(envs.reset(seed=[0, 1])[0].shape, envs.step([0, 1])[1].shape)
     envs.close()
 """
@@ -161,7 +160,7 @@ def test_spawned_processes_work(tmp_path):
 
 FORK = """
 import gymnasium, multiprocessing
-import attjax.gymnasium_env
+import attjax.wrappers.gymnasium
 {before}
 def work():
     env = {make}

@@ -11,7 +11,7 @@ from gymnasium.error import ResetNeeded  # noqa: E402
 from gymnasium.vector import AutoresetMode  # noqa: E402
 from gymnasium.wrappers import vector as wrappers  # noqa: E402
 
-from attjax.gymnasium_env import ID, SlewEnv  # noqa: E402
+from attjax.wrappers.gymnasium import ID, SlewEnv  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("error")
 MODES = list(AutoresetMode)

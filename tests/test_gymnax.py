@@ -11,7 +11,7 @@ from gymnax import wrappers  # noqa: E402
 from gymnax.environments import environment, spaces  # noqa: E402
 
 from attjax import AttitudeEnv  # noqa: E402
-from attjax.gymnax_compat import FiveValueEnv, GymnaxEnv  # noqa: E402
+from attjax.wrappers.gymnax import FiveValueEnv, GymnaxEnv  # noqa: E402
 
 KEY = jax.random.key(0)
 ENVS = [AttitudeEnv(20), GymnaxEnv(AttitudeEnv(20))]

@@ -89,13 +89,15 @@ def test_recorded_slews_have_the_keys_of_the_flown_ones():
 
 @pytest.mark.parametrize("mode", ["one", "SameStep", "NextStep"])
 def test_each_step_under_gymnasium_has_its_own_key(mode):
-    gymnasium_env = pytest.importorskip("attjax.gymnasium_env")
+    pytest.importorskip("gymnasium")
+    from attjax.wrappers import gymnasium
+
     env = Noisy(1)
     params = short(env)
     if mode == "one":
-        gym, action = gymnasium_env.SlewEnv(env=env, params=params), 0
+        gym, action = gymnasium.SlewEnv(env=env, params=params), 0
     else:
-        gym = gymnasium_env.SlewVectorEnv(2, env=env, params=params, autoreset_mode=mode)
+        gym = gymnasium.SlewVectorEnv(2, env=env, params=params, autoreset_mode=mode)
         action = np.zeros(2, int)
     jax.effects_barrier()
     for seen in (env.starts, env.observations, env.steps):

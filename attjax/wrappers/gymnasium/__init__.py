@@ -1,1 +1,18 @@
-"""The slew task under Gymnasium."""
+"""The slew task for Gymnasium: one spacecraft, or many in one jitted call.
+
+Importing it registers ``attjax/Slew-v0`` for ``gymnasium.make`` and ``gymnasium.make_vec``; the id
+``attjax.wrappers.gymnasium:attjax/Slew-v0`` imports it. It needs the extra ``gym``.
+"""
+
+import gymnasium
+
+from attjax.wrappers.gymnasium.single import ID, SlewEnv
+from attjax.wrappers.gymnasium.vector import SlewVectorEnv
+
+__all__ = ["ID", "SlewEnv", "SlewVectorEnv"]
+
+gymnasium.register(
+    ID,
+    entry_point=f"{__name__}:SlewEnv",
+    vector_entry_point=f"{__name__}:SlewVectorEnv",
+)

@@ -22,21 +22,21 @@ class SlewVectorEnv(Task, VectorEnv):
     ``info["final_obs"]`` (an array of objects) and ``info["final_info"]`` hold the ended one's
     where ``info["_final_obs"]``. NEXT_STEP: the next step starts a fresh one, whatever its
     action, with reward 0. DISABLED: nothing, until ``reset`` with a mask.
-    ``info`` is that of :class:`attjax.gymnasium_env.SlewEnv` with (num_envs,) arrays.
+    ``info`` is that of :class:`attjax.wrappers.gymnasium.SlewEnv` with (num_envs,) arrays.
 
     Args:
         num_envs: spacecraft.
         max_episode_steps: time limit, agent steps; None leaves the task's.
         autoreset_mode: a ``gymnasium.vector.AutoresetMode`` or its value, as "NextStep".
         options: ``frameskip``, ``reward``, ``env``, ``params``, ``render_mode`` and
-            ``rate_margin``, as :class:`attjax.gymnasium_env.SlewEnv`; the same for all.
+            ``rate_margin``, as :class:`attjax.wrappers.gymnasium.SlewEnv`; the same for all.
 
     Raises:
         ValueError: an argument is not as said.
 
     Example:
         >>> import gymnasium
-        >>> envs = gymnasium.make_vec("attjax.gymnasium_env:attjax/Slew-v0", num_envs=3)
+        >>> envs = gymnasium.make_vec("attjax.wrappers.gymnasium:attjax/Slew-v0", num_envs=3)
         >>> observations, _ = envs.reset(seed=0)
         >>> envs.step(np.array([0, 1, 18]))[0].shape
         (3, 11)
@@ -69,8 +69,8 @@ class SlewVectorEnv(Task, VectorEnv):
 
         Args:
             seed: an integer, of these and all later episodes; a list of one for each spacecraft,
-                whose start is that of a :class:`attjax.gymnasium_env.SlewEnv` of that seed; None
-                goes on as seeded before, in the list too.
+                whose start is that of a :class:`attjax.wrappers.gymnasium.SlewEnv` of that
+                seed; None goes on as seeded before, in the list too.
             options: ``{"reset_mask": (num_envs,) bool}`` resets only where it is true.
 
         Raises:
