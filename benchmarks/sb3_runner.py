@@ -7,7 +7,7 @@ from stable_baselines3 import PPO
 
 import attjax.wrappers.gymnasium
 from attjax.config.presets import PAPER_FAST
-from attjax.sb3 import as_vec_env
+from attjax.wrappers.sb3 import as_vec_env
 
 
 def environment(num_envs: int):

@@ -40,7 +40,7 @@ def test_torchrl_checks_one_and_reads_its_info_and_pictures():
 
 def test_sbxs_ppo_learns_a_little():
     sbx = pytest.importorskip("sbx")
-    from attjax.sb3 import as_vec_env
+    from attjax.wrappers.sb3 import as_vec_env
 
     vec_env = as_vec_env(SlewVectorEnv(8), 0.01, time_limit_terminates=True)
     with jax.legacy_prng_key("allow"):  # its own keys are

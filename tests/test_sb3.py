@@ -9,8 +9,8 @@ stable_baselines3 = pytest.importorskip("stable_baselines3")
 import torch  # noqa: E402
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecVideoRecorder  # noqa: E402
 
-from attjax.sb3 import as_vec_env  # noqa: E402
 from attjax.wrappers.gymnasium import ID  # noqa: E402
+from attjax.wrappers.sb3 import as_vec_env  # noqa: E402
 
 
 def make_vec(num_envs, **options):
