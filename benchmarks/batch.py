@@ -7,7 +7,7 @@ import numpy as np
 
 import attjax
 from attjax import AttitudeEnv
-from attjax.envs import simulator
+from attjax.envs import initial_state, simulator
 from attjax.envs.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
 from attjax.spacecraft import INTEGRATION_STEP, LM50
 
@@ -28,7 +28,7 @@ class Batch:
     def __init__(self, num_envs: int, multiple: int = 1):
         self.size = -(-num_envs // multiple) * multiple
         self.params = ENV.default_params
-        draw = jax.jit(jax.vmap(simulator.initial_state, (0, None)))
+        draw = jax.jit(jax.vmap(initial_state.initial_state, (0, None)))
         state = draw(jax.random.split(jax.random.key(0), self.size), self.params)
         self.quaternion = _aligned((4, self.size), FLOAT)
         self.angular_velocity = _aligned((3, self.size), FLOAT)

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from attjax import errors
-from attjax.config import arguments
+from attjax.config import command_line
 
 PACKAGES = ("jax", "jaxlib", "numpy", "numba", "bsk")
 MIN_TABLE_WIDTH = 120
@@ -178,16 +178,16 @@ def write_json(path: Path | None, result: dict) -> None:
         path.write_text(json.dumps(result, indent=1) + "\n")
 
 
-def parser(description: str) -> arguments.Parser:
+def parser(description: str) -> command_line.Parser:
     """A parser with --json."""
-    parser = arguments.Parser(description=description)
+    parser = command_line.Parser(description=description)
     parser.add_argument(
         "--json", type=writable_file, metavar="FILE", help="write the figures there"
     )
     return parser
 
 
-def add_num_envs(parser: arguments.Parser, default: tuple[int, ...]) -> None:
+def add_num_envs(parser: command_line.Parser, default: tuple[int, ...]) -> None:
     """Add --num-envs."""
     parser.add_argument(
         "--num-envs",

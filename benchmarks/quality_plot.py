@@ -4,7 +4,7 @@ from pathlib import Path
 
 import matplotlib
 
-from attjax.evaluation.tables import PAPER_TABLE_2
+from attjax.evaluation.paper import PAPER_TABLE_2
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

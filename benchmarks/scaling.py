@@ -17,7 +17,7 @@ import time
 import common
 
 from attjax import errors
-from attjax.config import arguments as cli
+from attjax.config import command_line
 
 NUM_ENVS = (2048, 8192, 32768, 131072, 524288, 1048576)
 NETWORKS = ((400, 300), (64, 64))
@@ -32,8 +32,8 @@ def parse_arguments(argv):
     """The command line; --child is for the processes that this script starts."""
     parser = common.parser(__doc__)
     common.add_num_envs(parser, NUM_ENVS)
-    cli.add_number(parser, "repeats", int, 7, "measurements of each figure", low=1)
-    cli.add_number(parser, "cores", int, 2, "compare one core and that many", low=1)
+    command_line.add_number(parser, "repeats", int, 7, "measurements of each figure", low=1)
+    command_line.add_number(parser, "cores", int, 2, "compare one core and that many", low=1)
     parser.add_argument(
         "--minibatch-size",
         type=common.positive_integers,

@@ -15,7 +15,7 @@ import common
 import numpy as np
 
 from attjax import errors
-from attjax.config import arguments as cli
+from attjax.config import command_line
 
 NUM_ENVS = (1, 4, 16, 64, 256, 1024, 2048, 4096, 16384, 65536, 262144, 1048576)
 RK4_STEPS = 21
@@ -41,8 +41,10 @@ def parse_arguments(argv):
     plot_help = "draw throughput against the number of spacecraft"
     parser.add_argument("--plot", type=common.writable_file, metavar="FILE.png", help=plot_help)
     common.add_num_envs(parser, NUM_ENVS)
-    cli.add_number(parser, "repeats", int, 7, "measurements of each figure", low=1)
-    cli.add_number(parser, "cores", int, 1, "processor cores; the fused rollout uses all", low=1)
+    command_line.add_number(parser, "repeats", int, 7, "measurements of each figure", low=1)
+    command_line.add_number(
+        parser, "cores", int, 1, "processor cores; the fused rollout uses all", low=1
+    )
     parser.add_argument("--device", choices=("cpu", "gpu"), default="cpu", help="(default: cpu)")
     return parser.parse_args(argv)
 

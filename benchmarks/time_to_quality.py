@@ -205,7 +205,7 @@ class Examiner:
 def beats_table_2(statistics: dict) -> bool:
     """Whether all statistics of error and rate, but the minima, are below the paper's."""
     from attjax.evaluation import STATISTICS
-    from attjax.evaluation.tables import PAPER_TABLE_2
+    from attjax.evaluation.paper import PAPER_TABLE_2
 
     return all(
         statistics[state][quantity][name] < paper

@@ -20,7 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from attjax import AttitudeEnv
-from attjax.control import time_optimal
+from attjax.evaluation import paper
 from attjax.export import c as export_c
 from attjax.export import flight_check, provenance
 from attjax.export.flight_check import Decisions
@@ -209,7 +209,7 @@ def _in_float32(flight):
 
     params = flight.env.default_params
     act = jax.tree_util.Partial(flight.policy.act, flight.params)
-    start, steps = time_optimal.table_5_slews(), int(params.max_steps_in_episode)
+    start, steps = paper.table_5_slews(), int(params.max_steps_in_episode)
     history = evaluation.record(act, flight.env, params, jax.random.key(0), start, steps)
     angles = jnp.rad2deg(jax.vmap(quaternion.error_angle)(history.quaternion[-1]))
     return ", ".join(f"{angle:.6f}" for angle in angles.tolist())

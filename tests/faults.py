@@ -120,7 +120,7 @@ FAULTS = {
         ["tests/test_env.py"],
     ),
     "sign in TABLE_5": (
-        "attjax/control/time_optimal.py",
+        "attjax/evaluation/paper.py",
         '"slew2": (0.44228, -0.44228', '"slew2": (0.44228, 0.44228',
         ["tests/test_slew_references.py"],
     ),
@@ -136,17 +136,17 @@ FAULTS = {
         "attjax/ppo/train_state.py", "if settings.max_gradient_norm > 0:", "if False:", DESCENT,
     ),
     "normalize_advantage ignored: always": (
-        "attjax/ppo/update.py", "if settings.normalize_advantage:", "if True:", DESCENT,
+        "attjax/ppo/descent.py", "if settings.normalize_advantage:", "if True:", DESCENT,
     ),
     "normalize_advantage ignored: never": (
-        "attjax/ppo/update.py", "if settings.normalize_advantage:", "if False:", DESCENT,
+        "attjax/ppo/descent.py", "if settings.normalize_advantage:", "if False:", DESCENT,
     ),
     "same shuffle in each pass": (
-        "attjax/ppo/update.py", "jax.random.split(pass_key, settings.passes)",
+        "attjax/ppo/descent.py", "jax.random.split(pass_key, settings.passes)",
         "jnp.stack([pass_key] * settings.passes)", DESCENT,
     ),
     "same shuffle on each device": (
-        "attjax/ppo/update.py", "jax.random.fold_in(pass_key, jax.lax.axis_index(AXIS))",
+        "attjax/ppo/descent.py", "jax.random.fold_in(pass_key, jax.lax.axis_index(AXIS))",
         "jax.random.fold_in(pass_key, 0)", DESCENT,
     ),
     "approximate KL without its ratio": (

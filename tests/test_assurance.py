@@ -7,7 +7,7 @@ from bodies import LM50, rotated_inertia
 from attjax import AttitudeEnv, dynamics
 from attjax.control import assurance
 from attjax.dynamics import rigid_body
-from attjax.envs import simulator
+from attjax.envs import initial_state, simulator
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -96,7 +96,7 @@ def test_no_policy_under_the_mask_passes_the_limit(frameskip, reckless):
         return state, jnp.sqrt(jnp.sum(state.angular_velocity**2))
 
     def highest_rate(key):
-        start = simulator.initial_state(key, params)
+        start = initial_state.initial_state(key, params)
         return jnp.max(jax.lax.scan(step, start, jax.random.split(key, 1750))[1])
 
     rates = jax.jit(jax.vmap(highest_rate))(jax.random.split(jax.random.key(1), 64))

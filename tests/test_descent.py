@@ -11,8 +11,7 @@ from jax.sharding import PartitionSpec
 from setups import small_attitude_setup
 
 from attjax import sharding
-from attjax.ppo import train_state
-from attjax.ppo import update as descent
+from attjax.ppo import descent, train_state
 from attjax.ppo.networks import Inputs
 
 ACTIONS = 19

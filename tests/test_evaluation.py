@@ -5,9 +5,9 @@ import pytest
 
 import attjax
 from attjax import AttitudeEnv, EnvState, Spacecraft, evaluation
-from attjax.control import time_optimal
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.observation import ANGULAR_VELOCITY
+from attjax.evaluation import paper
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -153,7 +153,7 @@ def test_a_torque_counts_for_as_long_as_it_acts(held, duration):
 
 def test_recorded_steps_are_those_of_the_simulator():
     """Step by step with attjax.step, past the rate limit too: nothing ends."""
-    start = time_optimal.table_5_slews()
+    start = paper.table_5_slews()
     act = jax.tree_util.Partial(lambda q, _: jnp.where(q[0] > 0, 3, 2))
     history = evaluation.record(act, ENV, ENV.default_params, jax.random.key(0), start, 32)
     state, step = jax.tree.map(lambda x: x[2], start), jax.jit(attjax.step)

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 from commands import eval_script, export_script, one_line_error, python, train_script
 
-from attjax.config import arguments as cli
-from attjax.config import presets, toml
+from attjax.config import command_line, presets, toml
 from attjax.config import run as run_config
 from attjax.runs import folder as run_folder
 
@@ -119,7 +118,7 @@ def test_toml_of_endless_depth_is_one_line(tmp_path, capsys):
 
 def test_a_tilde_is_the_home_where_the_shell_leaves_it(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
-    assert cli.path("~/runs/a") == tmp_path / "runs" / "a"
+    assert command_line.path("~/runs/a") == tmp_path / "runs" / "a"
     arguments = train_script.parse_arguments(["--checkpoint=~/a", "--config=~/b", "--spacecraft=~"])
     assert arguments.checkpoint == tmp_path / "a" and arguments.config == tmp_path / "b"
     assert arguments.spacecraft == tmp_path

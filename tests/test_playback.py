@@ -13,7 +13,7 @@ from pages import CONTROLLERS, ENV, HOSTILE, embedded
 
 import attjax
 from attjax import AttitudeEnv, evaluation
-from attjax.control import time_optimal
+from attjax.evaluation import paper
 from attjax.evaluation.playback import page as playback
 
 
@@ -39,7 +39,7 @@ def test_the_page_holds_the_recorded_flights():
     evaluated = evaluation.random_slews(env, params, jax.random.key(3), 500)[1]
     starts = jax.tree.map(
         lambda test, random: jnp.concatenate([test, random[: playback.RANDOM_SLEWS]]),
-        time_optimal.table_5_slews(),
+        paper.table_5_slews(),
         evaluated,
     )
     for samples, controller in zip(data["flights"].swapaxes(0, 1), CONTROLLERS.values()):

@@ -10,7 +10,7 @@ from attjax.control import classical, time_optimal
 from attjax.control.classical import average_torque
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.simulator import EnvState
-from attjax.evaluation import plots
+from attjax.evaluation import paper, plots
 from attjax.runs import learning_curve
 
 ENV = AttitudeEnv(frameskip=5)
@@ -75,7 +75,7 @@ def test_recorded_slews_are_the_flown_ones(x64):
 
 
 def test_table_5_slews_are_100_degrees():
-    for quaternion in time_optimal.TABLE_5.values():
+    for quaternion in paper.TABLE_5.values():
         angle = np.rad2deg(float(quaternions.error_angle(jnp.array(quaternion))))
         assert angle == pytest.approx(100, abs=0.01)
 
@@ -85,7 +85,7 @@ def test_time_optimal_reference_of_table_5():
     for frameskip, expected in ((20, 17.4), (5, 9.3)):
         env = AttitudeEnv(frameskip)
         context = env.context(env.default_params)
-        slew = jnp.array(time_optimal.TABLE_5["slew1"])
+        slew = jnp.array(paper.TABLE_5["slew1"])
         time = time_optimal.time_optimal_reference(slew, context)
         assert float(time) == pytest.approx(expected, abs=0.05)
     acceleration = float(average_torque(context)) / 0.115

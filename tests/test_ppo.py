@@ -11,8 +11,7 @@ from setups import fly, settings, small_attitude_setup
 
 from attjax import AttitudeEnv, ppo, sharding
 from attjax.config import presets
-from attjax.ppo import train_state
-from attjax.ppo import update as descent
+from attjax.ppo import descent, train_state
 from attjax.ppo.networks import Policy
 from attjax.runs import build
 

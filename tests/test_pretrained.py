@@ -6,7 +6,7 @@ import jax
 import pytest
 
 from attjax import AttitudeEnv, evaluation
-from attjax.evaluation.tables import PAPER_TABLE_2
+from attjax.evaluation.paper import PAPER_TABLE_2
 from attjax.runs import checkpoint
 
 FOLDER = Path(__file__).parent.parent / "pretrained" / "precise"

@@ -6,7 +6,7 @@ import pytest
 import attjax
 from attjax import AttitudeEnv
 from attjax.dynamics import quaternion as quaternions
-from attjax.envs import simulator
+from attjax.envs import initial_state, simulator
 from attjax.spacecraft import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.usefixtures("strict_promotion")
 def states(n, seed=0):
     params = simulator.default_params()
     keys = jax.random.split(jax.random.key(seed), n)
-    return jax.vmap(simulator.initial_state, (0, None))(keys, params)
+    return jax.vmap(initial_state.initial_state, (0, None))(keys, params)
 
 
 def test_torques_are_table_1():
@@ -55,7 +55,7 @@ def test_initial_slews_are_uniform_in_angle_and_axis():
 def test_near_goal_starts_cover_every_decade_of_angle_and_rate():
     n = 100_000
     params = simulator.default_params()
-    starts = simulator.NearGoalStarts(share=0.75, steps=64)
+    starts = initial_state.NearGoalStarts(share=0.75, steps=64)
     drawn = jax.vmap(starts, (0, None))(jax.random.split(jax.random.key(0), n), params)
     near = np.asarray(drawn.time) == 500 - 64
     assert near.mean() == pytest.approx(0.75, abs=5 * np.sqrt(0.75 * 0.25 / n))
@@ -74,7 +74,7 @@ def test_near_goal_starts_cover_every_decade_of_angle_and_rate():
 
 def test_near_goal_starts_never_mark_a_whole_episode():
     params = simulator.default_params().replace(max_steps_in_episode=jnp.int32(10))
-    starts = simulator.NearGoalStarts(share=0.999, steps=64)
+    starts = initial_state.NearGoalStarts(share=0.999, steps=64)
     times = jax.vmap(starts, (0, None))(jax.random.split(jax.random.key(0), 50), params).time
     assert set(times.tolist()) == {1}
 
@@ -133,7 +133,7 @@ def test_near_goal_starts_are_made_of_independent_uniform_numbers():
     """Each quantity is uniform after its inverse distribution function, and no two are related."""
     n = 100_000
     params = simulator.default_params()
-    starts = simulator.NearGoalStarts(share=0.5, steps=64)
+    starts = initial_state.NearGoalStarts(share=0.5, steps=64)
     drawn = jax.vmap(starts, (0, None))(jax.random.split(jax.random.key(0), n), params)
     near = np.asarray(drawn.time) > 0
     angle = np.asarray(jax.vmap(quaternions.error_angle)(drawn.quaternion))
@@ -158,16 +158,18 @@ def test_near_goal_starts_are_made_of_independent_uniform_numbers():
 def test_a_share_of_none_is_none(monkeypatch):
     """Though the number that decides may be 0."""
     monkeypatch.setattr(jax.random, "uniform", lambda key, shape, dtype: jnp.zeros(shape, dtype))
-    none = simulator.NearGoalStarts(share=0.0, steps=64)
+    none = initial_state.NearGoalStarts(share=0.0, steps=64)
     start = none(jax.random.key(0), simulator.default_params())
     assert not start.angular_velocity.any() and start.time == 0
-    assert hash(none) == hash(simulator.NearGoalStarts(share=0.0, steps=64))  # a static argument
+    assert hash(none) == hash(
+        initial_state.NearGoalStarts(share=0.0, steps=64)
+    )  # a static argument
 
 
 def test_an_environment_says_which_episodes_are_whole():
     """Those that start at rest, of full length; none of those that start near the goal."""
     for steps in (64, 10_000):  # longer than an episode, too
-        starts = simulator.NearGoalStarts(share=0.5, steps=steps)
+        starts = initial_state.NearGoalStarts(share=0.5, steps=steps)
         env = AttitudeEnv(frameskip=20, initial_state=starts)
         keys = jax.random.split(jax.random.key(0), 200)
         states = jax.vmap(env.reset, (0, None))(keys, env.default_params)[1]

@@ -17,6 +17,7 @@ from attjax.config import toml
 from attjax.config.presets import PAPER
 from attjax.config.run import Config
 from attjax.control import assurance, classical, time_optimal
+from attjax.evaluation import paper
 from attjax.spacecraft import LM50
 
 CUBESAT = Spacecraft(
@@ -66,7 +67,7 @@ def test_parameters_are_as_described():
 def test_a_held_torque_turns_a_cubesat_by_its_closed_form(x64):
     """From rest about a principal axis: angle U t²/2I, rate U t/I."""
     env = AttitudeEnv(frameskip=23, spacecraft=CUBESAT)
-    state = time_optimal.table_5_slews()
+    state = paper.table_5_slews()
     start = jax.tree.map(lambda x: x[0], state).replace(quaternion=jnp.array([0.0, 0, 0, 1]))
     for _ in range(10):
         start = env.step_env(None, start, 1, env.default_params)[1]  # + 2 mN m about x

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import attjax
 from attjax import errors
-from attjax.config import arguments
+from attjax.config import command_line
 
 COMMANDS = {
     "train": "train a neural attitude controller by PPO",
@@ -27,7 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _parse(argv):
     epilog = "attjax COMMAND --help lists the flags of a command."
-    parser = arguments.Parser(usage=USAGE, description=attjax.__doc__, epilog=epilog)
+    parser = command_line.Parser(usage=USAGE, description=attjax.__doc__, epilog=epilog)
     version = f"attjax {attjax.__version__}"
     parser.add_argument("--version", action="version", version=version, help="print the version")
     commands = parser.add_subparsers(

@@ -10,8 +10,7 @@ from pathlib import Path
 
 from attjax import destinations, devices, errors
 from attjax.commands import evaluation_output
-from attjax.config import arguments as cli
-from attjax.config import fields, toml
+from attjax.config import command_line, fields, toml
 from attjax.runs import folder as run_folder
 from attjax.spacecraft import INTEGRATION_STEP, LM50, MOST_DURATION
 
@@ -33,7 +32,9 @@ examples:
 
 def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     """The command line."""
-    parser = cli.Parser(usage=USAGE, description=__doc__, epilog=cli.examples(EXAMPLES))
+    parser = command_line.Parser(
+        usage=USAGE, description=__doc__, epilog=command_line.examples(EXAMPLES)
+    )
     _add_who(parser.add_argument_group("what to evaluate"))
     _add_conditions(parser.add_argument_group("conditions, the same for all controllers"))
     _add_output(parser.add_argument_group("output"))
@@ -41,8 +42,8 @@ def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _add_who(group):
-    cli.add_checkpoint(group)
-    cli.add_best(group)
+    command_line.add_checkpoint(group)
+    command_line.add_best(group)
     who = group.add_mutually_exclusive_group()
     controller_help = "the trained policy (default), or a classical controller, without checkpoint"
     who.add_argument(
@@ -53,31 +54,33 @@ def _add_who(group):
 
 
 def _add_conditions(group):
-    cli.add_number(group, "episodes", int, 5000, "number of random slews", low=1, high=10**7)
-    cli.add_frameskip(
+    command_line.add_number(
+        group, "episodes", int, 5000, "number of random slews", low=1, high=10**7
+    )
+    command_line.add_frameskip(
         group, "RK4 steps of 1/240 s after the first of a decision, for 240/(N + 1) Hz"
     )
     craft_help = (
         "TOML file of the spacecraft that flies (default: the one that the policy was trained on; "
         "LM50 for a classical controller)"
     )
-    group.add_argument("--spacecraft", type=cli.path, metavar="FILE", help=craft_help)
+    group.add_argument("--spacecraft", type=command_line.path, metavar="FILE", help=craft_help)
     duration_help = "length of an episode (default: the spacecraft's; LM50's is 43.75)"
     limits = {"above": 0, "high": MOST_DURATION}
-    cli.add_number(group, "duration", float, None, duration_help, unit="s", **limits)
-    cli.add_seed_and_device(group, "seed of the initial slews")
+    command_line.add_number(group, "duration", float, None, duration_help, unit="s", **limits)
+    command_line.add_seed_and_device(group, "seed of the initial slews")
 
 
 def _add_output(group):
     json_help = "also write the statistics here; -: to stdout, and the report to stderr"
-    group.add_argument("--json", type=cli.path, metavar="FILE", help=json_help)
+    group.add_argument("--json", type=command_line.path, metavar="FILE", help=json_help)
     plot_help = "also draw figures into this folder (needs the extra plot)"
-    group.add_argument("--plot", type=cli.path, metavar="FOLDER", help=plot_help)
+    group.add_argument("--plot", type=command_line.path, metavar="FOLDER", help=plot_help)
     playback_help = (
         "also write a web page that replays slews in 3-D: the controller beside phase-plane, or "
         "phase-plane beside feedback"
     )
-    group.add_argument("--playback", type=cli.path, metavar="FILE", help=playback_help)
+    group.add_argument("--playback", type=command_line.path, metavar="FILE", help=playback_help)
 
 
 @errors.program("eval.py")
@@ -104,7 +107,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         json_file, aside = arguments.json, contextlib.nullcontext()
         if json_file == STDOUT:
             json_file, aside = sys.stdout, contextlib.redirect_stdout(sys.stderr)
-        cli.warn_of_untrained(arguments.frameskip, trained)
+        command_line.warn_of_untrained(arguments.frameskip, trained)
         with aside:
             return _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file)
 
@@ -196,11 +199,11 @@ def _check_duration(duration, frameskip):
 def _controller(name, arguments, spacecraft):
     import jax
 
-    from attjax.control import classical as controllers
+    from attjax.control import classical
     from attjax.runs import checkpoint
 
     if name != POLICY:
-        return jax.tree_util.Partial(controllers.CONTROLLERS[name])
+        return jax.tree_util.Partial(classical.CONTROLLERS[name])
     folder = arguments.checkpoint
     trained_on = run_folder.read_config(folder).spacecraft
     if trained_on.num_actions != spacecraft.num_actions:

@@ -6,8 +6,7 @@ import importlib
 from collections.abc import Sequence
 
 from attjax import destinations, devices, errors
-from attjax.config import arguments as cli
-from attjax.config import fields
+from attjax.config import command_line, fields
 from attjax.export import c_names
 from attjax.runs import folder as run_folder
 
@@ -27,24 +26,28 @@ examples:
 
 def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     """The command line."""
-    parser = cli.Parser(usage=USAGE, description=__doc__, epilog=cli.examples(EXAMPLES))
+    parser = command_line.Parser(
+        usage=USAGE, description=__doc__, epilog=command_line.examples(EXAMPLES)
+    )
     _add_what(parser.add_argument_group("what to export"))
     _add_output(parser.add_argument_group("output"))
     return parser.parse_args(argv)
 
 
 def _add_what(group):
-    cli.add_checkpoint(group)
-    cli.add_best(group)
-    cli.add_frameskip(group, "control rate of the flight software, 240/(N + 1) Hz")
-    cli.add_seed_and_device(group, "seed of the slews that test vectors come from")
+    command_line.add_checkpoint(group)
+    command_line.add_best(group)
+    command_line.add_frameskip(group, "control rate of the flight software, 240/(N + 1) Hz")
+    command_line.add_seed_and_device(group, "seed of the slews that test vectors come from")
 
 
 def _add_output(group):
     format_help = "c: C99 and C++, with a test program; onnx and stablehlo need the extra onnx"
     group.add_argument("--format", choices=FORMATS, required=True, help=format_help)
     out_help = "folder to write into"
-    group.add_argument("--out", type=cli.path, metavar="FOLDER", required=True, help=out_help)
+    group.add_argument(
+        "--out", type=command_line.path, metavar="FOLDER", required=True, help=out_help
+    )
     prefix_help = (
         "what the names of the files begin with, and in C those of functions and macros: for two "
         f"rates in one program (default: {c_names.PREFIX})"
@@ -73,7 +76,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         flight = _flight_policy(arguments)
         names = [c_names.renamed(name, arguments.prefix) for name in module.FILES]
         _prepare(arguments.out, names, arguments.overwrite)
-        cli.warn_of_untrained(flight.env.frameskip, flight.origin.frameskips)
+        command_line.warn_of_untrained(flight.env.frameskip, flight.origin.frameskips)
         with _exporting(arguments.checkpoint):
             contents = module.files(flight, arguments.seed or 0, arguments.prefix)
         with run_folder.writing(arguments.out):

@@ -4,8 +4,7 @@ import argparse
 from collections.abc import Sequence
 
 from attjax import devices, errors
-from attjax.config import arguments as cli
-from attjax.config import fields, presets, toml
+from attjax.config import command_line, fields, presets, toml
 from attjax.config import run as run_config
 from attjax.runs import signals
 
@@ -27,35 +26,39 @@ examples:
 
 def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     """The command line."""
-    parser = cli.Parser(usage=USAGE, description=__doc__, epilog=cli.examples(EXAMPLES))
+    parser = command_line.Parser(
+        usage=USAGE, description=__doc__, epilog=command_line.examples(EXAMPLES)
+    )
     groups = {name: parser.add_argument_group(title) for name, title in fields.GROUPS.items()}
     preset_help = f"the recipe; flags override it (default: {run_config.DEFAULT_PRESET})"
     groups["run"].add_argument("--preset", choices=presets.PRESETS, help=preset_help)
     craft_help = "TOML file that describes the spacecraft and its task (default: LM50, the paper's)"
-    groups["task"].add_argument("--spacecraft", type=cli.path, metavar="FILE", help=craft_help)
+    groups["task"].add_argument(
+        "--spacecraft", type=command_line.path, metavar="FILE", help=craft_help
+    )
     for name, group in groups.items():
-        cli.add_settings(group, name)
+        command_line.add_settings(group, name)
     _add_run(groups["run"])
     _add_logging(groups["logging"])
     return parser.parse_args(argv)
 
 
 def _add_run(group):
-    cli.add_checkpoint(group)
+    command_line.add_checkpoint(group)
     existing = group.add_mutually_exclusive_group()
     resume_help = "continue the folder's run, or start it if there is none"
     existing.add_argument("--resume", action="store_true", help=resume_help)
     existing.add_argument("--overwrite", action="store_true", help="replace the folder's run")
-    cli.add_seed_and_device(group, "seed of everything random")
+    command_line.add_seed_and_device(group, "seed of everything random")
     config_help = "TOML file with preset, seed, [settings] and [spacecraft]; flags override it"
-    group.add_argument("--config", type=cli.path, metavar="FILE", help=config_help)
+    group.add_argument("--config", type=command_line.path, metavar="FILE", help=config_help)
     print_help = "print the file that reproduces this run, and end"
     group.add_argument("--print-config", action="store_true", help=print_help)
 
 
 def _add_logging(group):
     save_help = "time between two checkpoints"
-    cli.add_number(group, "save-every", float, 30.0, save_help, unit="s", low=0)
+    command_line.add_number(group, "save-every", float, 30.0, save_help, unit="s", low=0)
     tensorboard_help = "also write TensorBoard's event files, into FOLDER/tensorboard"
     group.add_argument("--tensorboard", action="store_true", help=tensorboard_help)
     debug_help = "check every operation, and name the first that makes a NaN (slow)"
@@ -112,4 +115,4 @@ def _given(arguments):
             given[name] = getattr(arguments, name)
     if arguments.spacecraft is not None:
         given["spacecraft"] = toml.read_spacecraft(arguments.spacecraft)
-    return given | cli.overrides(arguments)
+    return given | command_line.overrides(arguments)

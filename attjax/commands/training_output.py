@@ -1,7 +1,7 @@
 """What ``train.py`` prints of a run: what it is, how it goes, how it ended."""
 
 from attjax import errors
-from attjax.config import arguments
+from attjax.config import command_line
 from attjax.config.settings import Settings
 from attjax.ppo import train_state
 from attjax.runs.progress import Progress
@@ -63,8 +63,8 @@ class Terminal(Observer):
         if self._stop.received is not None:
             print(f"stopped and saved at {run.agent_steps:,} agent steps; continue with --resume")
             return 128 + self._stop.received
-        folder = arguments.quoted(self._folder)
-        print(f"trained; evaluate with: {arguments.invocation('eval')} --checkpoint {folder}")
+        folder = command_line.quoted(self._folder)
+        print(f"trained; evaluate with: {command_line.invocation('eval')} --checkpoint {folder}")
         return 0
 
 

@@ -1,4 +1,4 @@
-"""What slews are compared by: the paper's examples (Table 5), and how long a slew must take."""
+"""How long a slew must take."""
 
 import chex
 import jax.numpy as jnp
@@ -7,22 +7,6 @@ from attjax.control.classical import average_torque
 from attjax.dynamics import numerics, rigid_body
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.context import Context
-from attjax.envs.simulator import EnvState
-
-TABLE_5 = {
-    "slew1": (0.44228, 0.44228, 0.44228, 0.64279),
-    "slew2": (0.44228, -0.44228, 0.44228, 0.64279),
-    "slew3": (-0.44228, -0.44228, 0.44228, 0.64279),
-}
-"""Initial error quaternions of the paper's three control examples, 100° each."""
-
-
-def table_5_slews() -> EnvState:
-    """States at the start of the slews of TABLE_5, as a batch of 3, at rest."""
-    quaternion = jnp.array(list(TABLE_5.values()), float)
-    quaternion /= jnp.linalg.norm(quaternion, axis=-1, keepdims=True)
-    n = len(quaternion)
-    return EnvState(quaternion, jnp.zeros((n, 3)), jnp.zeros(n, jnp.int32))
 
 
 def time_optimal_reference(quaternion: chex.Array, context: Context) -> chex.Array:

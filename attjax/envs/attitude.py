@@ -10,8 +10,8 @@ import numpy as np
 
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
+from attjax.envs import initial_state, simulator, spaces
 from attjax.envs import observation as observations
-from attjax.envs import simulator, spaces
 from attjax.envs.context import Context
 from attjax.envs.reward import Transition, paper_reward
 from attjax.envs.simulator import EnvParams, EnvState
@@ -49,8 +49,8 @@ class AttitudeEnv:
 
     frameskip: int = 20
     reward: Callable[[Transition], chex.Array] = paper_reward
-    initial_state: Callable[[chex.PRNGKey, EnvParams], EnvState] = simulator.initial_state
-    simulator: Spacecraft = LM50
+    initial_state: Callable[[chex.PRNGKey, EnvParams], EnvState] = initial_state.initial_state
+    spacecraft: Spacecraft = LM50
 
     def __post_init__(self):
         most = self.spacecraft.most_frameskip
@@ -187,7 +187,7 @@ class AttitudeEnv:
 
         The others, practice from the middle of it, count in no metric.
         """
-        return simulator.starts_whole(state)
+        return initial_state.starts_whole(state)
 
     def observation_space(self, params: EnvParams) -> spaces.Box:
         """Bounds of Eq. 11 up to the step that exceeds the rate limit.

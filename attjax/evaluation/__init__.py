@@ -1,15 +1,10 @@
 """Judging controllers: episodes, statistics, the paper's tables, figures, playback."""
 
-from attjax.evaluation.episodes import (
+from attjax.evaluation.episodes import Controller, Episodes, History, fly, random_slews, record
+from attjax.evaluation.statistics import (
     STATISTICS,
-    Controller,
-    Episodes,
-    History,
     conditions,
     evaluate,
-    fly,
-    random_slews,
-    record,
     settling_times,
     statistics,
     successes,

@@ -13,8 +13,9 @@ from attjax.control import time_optimal
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.simulator import EnvParams, EnvState
+from attjax.evaluation import paper
 from attjax.evaluation.episodes import Controller, Episodes
-from attjax.evaluation.tables import PAPER_TABLE_2, is_the_papers
+from attjax.evaluation.paper import PAPER_TABLE_2, is_the_papers
 
 STYLES = ("-", "--", "-.", ":")
 RANDOM_SLEWS = 200
@@ -67,7 +68,7 @@ class Flight:
     @functools.cached_property
     def table_5(self):
         """Time and history of Table 5's slews, which two figures show."""
-        return self.record(time_optimal.table_5_slews())
+        return self.record(paper.table_5_slews())
 
     def record(self, start: EnvState):
         """Time in s, (steps,), and the history of slews from the given states."""
@@ -94,7 +95,7 @@ def slews(flight: Flight, folder: Path) -> list[Path]:
     """What the paper's Figs. 5–7 show, of Table 5's slews, and the torques chosen."""
     time, history = flight.table_5
     paths = []
-    for index, name in enumerate(time_optimal.TABLE_5):
+    for index, name in enumerate(paper.TABLE_5):
         one = jax.tree.map(lambda x, index=index: np.asarray(x[:, index]), history)
         figure, axes = canvas.subplots(4, 1, figsize=(7, 9), sharex=True)
         _plot_components(axes[0], time, one.quaternion, ("q1", "q2", "q3", "q_s"))

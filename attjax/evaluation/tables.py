@@ -1,25 +1,12 @@
 """What eval.py prints: the paper's Table 2 beside ours."""
 
-import dataclasses
-
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from attjax.evaluation.episodes import STATISTICS
-from attjax.spacecraft import LM50, Spacecraft
-
-PAPER_TABLE_2 = {
-    ("closest", "error_deg"): (
-        0.000380, 0.000233, 0.000007, 0.000203, 0.000335, 0.000518, 0.001980),
-    ("closest", "rate_rad_s"): (
-        0.001976, 0.001316, 0.000066, 0.001387, 0.001868, 0.002371, 0.019339),
-    ("terminal", "error_deg"): (
-        0.001954, 0.000705, 0.000137, 0.001456, 0.001923, 0.002433, 0.004558),
-    ("terminal", "rate_rad_s"): (
-        0.001752, 0.001088, 0.000106, 0.001215, 0.001649, 0.002155, 0.018723),
-}  # fmt: skip
-"""Table 2 of the paper, in the order of STATISTICS; angles in degrees, rates in rad/s."""
+from attjax.evaluation.paper import PAPER_TABLE_2, is_the_papers
+from attjax.evaluation.statistics import STATISTICS
+from attjax.spacecraft import Spacecraft
 
 POINTING_ROWS = {
     "terminal φ, mean (°)": ("terminal", "error_deg", "mean"),
@@ -99,11 +86,6 @@ def _conditions(result, spacecraft):
         f"(frameskip {result['frameskip']}) of {result['duration_s']:.2f} s, "
         f"{'' if is_the_papers(spacecraft) else spacecraft.name + ', '}seed {result['seed']}"
     )
-
-
-def is_the_papers(spacecraft: Spacecraft) -> bool:
-    """Whether the paper's results can stand beside a spacecraft's; the duration may differ."""
-    return dataclasses.replace(spacecraft, duration=LM50.duration) == LM50
 
 
 def _table_2(result, with_paper):

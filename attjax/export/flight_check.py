@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from attjax import evaluation
-from attjax.control import time_optimal
 from attjax.dynamics import quaternion as quaternions
+from attjax.evaluation import paper
 from attjax.export import flight_policy
 from attjax.export.flight_policy import FlightPolicy
 from attjax.ppo import networks
@@ -95,7 +95,7 @@ class Flown:
 
 
 def fly_table_5(flight: FlightPolicy) -> Flown:
-    """Fly the slews of slew_references.TABLE_5, by an angle that is the spacecraft's task.
+    """Fly the slews of attjax.evaluation.paper.TABLE_5, by an angle that is the spacecraft's task.
 
     The spacecraft is simulated in float64, with the float32 constants that the policy knows, and
     the policy is told its state in float32. That is what the C test program does, so both see
@@ -117,7 +117,7 @@ def fly_table_5(flight: FlightPolicy) -> Flown:
 
 def _table_5(craft):
     """The slews of Table 5, about the same axes by fewer or more than 100° where it must be."""
-    start, (least, most) = time_optimal.table_5_slews(), craft.slew_angles_deg
+    start, (least, most) = paper.table_5_slews(), craft.slew_angles_deg
     if least <= 100 <= most:
         return start
     axes = start.quaternion[:, :3] / jnp.linalg.norm(start.quaternion[:, :3], axis=1)[:, None]

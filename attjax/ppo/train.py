@@ -14,9 +14,9 @@ from attjax import sharding
 from attjax.config.settings import PPO
 from attjax.envs import batch
 from attjax.ppo import losses
+from attjax.ppo.descent import Sample, optimize
 from attjax.ppo.rollout import Step, encode, episode_sums, rollout
 from attjax.ppo.train_state import LEARNER_SPECS, Learner, Setup
-from attjax.ppo.update import Sample, optimize
 from attjax.sharding import AXIS, SHARED
 
 

@@ -12,7 +12,7 @@ from attjax.config.run import Config
 from attjax.config.settings import Settings
 from attjax.control import assurance
 from attjax.control.features import FEATURES
-from attjax.envs import simulator
+from attjax.envs import initial_state, simulator
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.reward import REWARDS
 from attjax.errors import UserValueError
@@ -51,9 +51,9 @@ def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) ->
         UserValueError: the rate mask leaves no torque, even at rest.
     """
     reward = REWARDS.get(settings.task.reward) or user_functions.resolve(settings.task.reward)
-    start = simulator.initial_state
+    start = initial_state.initial_state
     if settings.task.near_goal_share > 0:
-        start = simulator.NearGoalStarts(
+        start = initial_state.NearGoalStarts(
             settings.task.near_goal_share, settings.task.near_goal_steps
         )
     env = AttitudeEnv(max(settings.task.frameskips), reward, start, craft)

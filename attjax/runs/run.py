@@ -10,10 +10,10 @@ from attjax import ppo
 from attjax.config.fields import frameskip_to_judge
 from attjax.config.run import Config
 from attjax.envs.attitude import AttitudeEnv
-from attjax.ppo import train_state as learner
+from attjax.ppo import train_state
 from attjax.ppo.train_state import Learner, Setup
 from attjax.runs import build, metrics, metrics_file
-from attjax.runs import debug_nans as nan_search
+from attjax.runs import debug_nans as nan_check
 
 
 class Diverged(Exception):
@@ -36,7 +36,7 @@ class Run:
     def __init__(self, config: Config, setup: Setup):
         self.config, self.setup = config, setup
         self.env_params = build.env_params(setup)
-        self.learner = learner.init(setup, self.env_params, jax.random.key(config.seed))
+        self.learner = train_state.init(setup, self.env_params, jax.random.key(config.seed))
         self.update, self.rows, self.wall_s, self._clock = 0, [], 0.0, None
 
     def go_on_from(self, learner: Learner, rows: list[dict], wall_s: float) -> None:
@@ -88,7 +88,7 @@ class Run:
         """The compiled program of a block of updates; if asked, with a check of every operation."""
         arguments = self.setup, self.env_params, self.learner
         if debug_nans:
-            return nan_search.train_block(*arguments)
+            return nan_check.train_block(*arguments)
         return ppo.train_block.lower(*arguments, 1).compile()
 
     def train_block(self, train_block: Callable) -> dict:
@@ -107,7 +107,7 @@ class Run:
         count = min(count, settings.ppo.num_updates - self.update)
         try:
             self.learner, block = train_block(self.env_params, self.learner, count)
-        except nan_search.NotFinite as found:
+        except nan_check.NotFinite as found:
             raise self._diverged(self.update, count, str(found)) from None
         diverged = {name: int(update) for name, update in block["diverged"].items()}
         if max(diverged.values()) >= 0:

@@ -9,10 +9,10 @@ import numpy as np
 
 import attjax
 from attjax import evaluation, resources
-from attjax.control import time_optimal
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.simulator import EnvParams, EnvState
+from attjax.evaluation import paper
 from attjax.evaluation.episodes import Controller
 from attjax.values import integer
 
@@ -73,12 +73,12 @@ def page(
 
 def _starts(env, params, key) -> EnvState:
     random = evaluation.random_slews(env, params, key, RANDOM_SLEWS)[1]
-    return jax.tree.map(lambda *x: jnp.concatenate(x), time_optimal.table_5_slews(), random)
+    return jax.tree.map(lambda *x: jnp.concatenate(x), paper.table_5_slews(), random)
 
 
 def _slew_names(start):
     angles = np.rad2deg(jax.vmap(quaternions.error_angle)(start.quaternion))
-    names = [f"Table 5, test {number}" for number in range(1, len(time_optimal.TABLE_5) + 1)]
+    names = [f"Table 5, test {number}" for number in range(1, len(paper.TABLE_5) + 1)]
     names += [f"random {number}" for number in range(1, RANDOM_SLEWS + 1)]
     return [f"{name}: {angle:.1f}°" for name, angle in zip(names, angles)]
 
