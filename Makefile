@@ -38,10 +38,10 @@ TORCH_CLIENTS := stable-baselines3 sb3-contrib sbx-rl tianshou torchrl skrl
 PIP = $(@D)/bin/python -m pip --disable-pip-version-check
 
 test-peers: $(VENV)-gym/installed $(VENV)-rejax/installed
-	$(VENV)-gym/bin/python -m pytest tests/test_gymnasium*.py tests/test_rendering.py \
-	    tests/test_sb3.py tests/test_clients.py tests/test_docs.py::test_python_runs \
+	$(VENV)-gym/bin/python -m pytest tests/wrappers/test_gymnasium*.py tests/wrappers/test_rendering.py \
+	    tests/wrappers/test_sb3.py tests/wrappers/test_clients.py tests/test_docs.py::test_python_runs \
 	    attjax/wrappers/gymnasium/single.py attjax/wrappers/gymnasium/vector.py attjax/wrappers/sb3.py $(ARGS)
-	$(VENV)-rejax/bin/python -m pytest tests/test_gymnax.py tests/test_docs.py::test_python_runs \
+	$(VENV)-rejax/bin/python -m pytest tests/wrappers/test_gymnax.py tests/test_docs.py::test_python_runs \
 	    attjax/wrappers/gymnax.py $(ARGS)
 
 $(VENV)-gym/installed: pyproject.toml
@@ -61,7 +61,7 @@ $(VENV)-rejax/installed: pyproject.toml
 
 # The tests are tried on broken code; ARGS='--modules losses reward' for a part of it.
 mutants: $(VENV)/installed-mutation
-	$(BIN)/python tests/mutants.py $(ARGS)
+	$(BIN)/python tests/mutation/mutants.py $(ARGS)
 
 lint: setup
 	$(BIN)/ruff check .

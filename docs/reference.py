@@ -3,9 +3,12 @@
 It needs the extra ``docs``. Modules whose peers are not installed are left out.
 """
 
-import importlib.util
+import importlib
+import pkgutil
 import sys
+from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 
 import chex
 import optax  # noqa: F401 (imports chex before its types change)
@@ -14,23 +17,31 @@ import pdoc
 import attjax
 
 PEERS = {
-    "gymnasium_env": ["gymnasium"],
-    "gymnasium_vector": ["gymnasium"],
-    "gymnasium_task": ["gymnasium"],
-    "rendering": ["matplotlib"],
-    "sb3": ["gymnasium", "stable_baselines3"],
-    "gymnax_compat": ["gymnax"],
-    "export_stablehlo": ["flatbuffers"],
-    "export_onnx": ["onnx"],
-    "plots": ["matplotlib"],
-    "learning_curve": ["matplotlib"],
+    "attjax.wrappers.gymnasium": ["gymnasium"],
+    "attjax.gymnasium_env": ["gymnasium"],
+    "attjax.gymnasium_vector": ["gymnasium"],
+    "attjax.wrappers.rendering": ["matplotlib"],
+    "attjax.wrappers.sb3": ["gymnasium", "stable_baselines3"],
+    "attjax.sb3": ["gymnasium", "stable_baselines3"],
+    "attjax.wrappers.gymnax": ["gymnax"],
+    "attjax.gymnax_compat": ["gymnax"],
+    "attjax.export.stablehlo": ["flatbuffers"],
+    "attjax.export.onnx": ["onnx"],
+    "attjax.evaluation.plots": ["matplotlib"],
+    "attjax.runs.learning_curve": ["matplotlib"],
 }
 
 
-def modules() -> list[str]:
-    """The modules that can be imported here."""
-    names = sorted(path.stem for path in Path(attjax.__file__).parent.glob("[!_]*.py"))
-    return [name for name in names if all(map(importlib.util.find_spec, PEERS.get(name, [])))]
+def list_modules(package: ModuleType) -> None:
+    """Name a package's modules in its ``__all__``, where pdoc looks, if their peers are here."""
+    names = []
+    for module in pkgutil.iter_modules(package.__path__):
+        full = f"{package.__name__}.{module.name}"
+        if module.name != "__main__" and all(map(find_spec, PEERS.get(full, []))):
+            names.append(module.name)
+            if module.ispkg:
+                list_modules(importlib.import_module(full))
+    package.__all__ = list(dict.fromkeys([*getattr(package, "__all__", []), *names]))
 
 
 def build(folder: Path) -> None:
@@ -39,9 +50,9 @@ def build(folder: Path) -> None:
     chex.Array, chex.PRNGKey, chex.ArrayTree = (
         type(name, (), {"__module__": "chex"}) for name in ("Array", "PRNGKey", "ArrayTree")
     )
-    # pdoc lists what __all__ names, and finds it only once it is there.
+    # pdoc finds a name only once it is there.
     vars(attjax).update({name: getattr(attjax, name) for name in attjax.__all__})
-    attjax.__all__ = attjax.__all__ + modules()
+    list_modules(attjax)
     pdoc.render.configure(docformat="google", footer_text=f"attjax {attjax.__version__}")
     pdoc.pdoc("attjax", output_directory=folder)
 

@@ -4,8 +4,8 @@ import pytest
 from commands import STEPS_PER_UPDATE, TINY, run
 from fuzzing import Accepted
 
-from attjax import evaluation
 from attjax.commands import training_output
+from attjax.evaluation import summary
 from attjax.evaluation.playback import page as playback
 from attjax.runs import trainer
 
@@ -43,7 +43,7 @@ def no_work(monkeypatch):
     def accept(*_, **__):
         raise Accepted
 
-    monkeypatch.setattr(evaluation, "fly", accept)
+    monkeypatch.setattr(summary, "fly", accept)
     monkeypatch.setattr(trainer, "_train", accept)
     monkeypatch.setattr(training_output.Terminal, "started", lambda *_: None)
 

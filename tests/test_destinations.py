@@ -6,8 +6,9 @@ import signal
 import pytest
 from commands import eval_script
 
-from attjax import destinations, evaluation
+from attjax import destinations
 from attjax.errors import UserError
+from attjax.evaluation import summary
 
 
 def test_a_write_that_fails_leaves_what_was_there(tmp_path, monkeypatch):
@@ -58,7 +59,7 @@ def test_an_interrupted_evaluation_ends_in_a_line(monkeypatch, capsys):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(evaluation, "fly", interrupted)
+    monkeypatch.setattr(summary, "fly", interrupted)
     arguments = ["--controller", "feedback", "--device", "cpu", "--episodes", "1"]
     assert eval_script.main(arguments) == 128 + signal.SIGINT
     assert capsys.readouterr().err == "eval.py: error: interrupted\n"

@@ -7,7 +7,7 @@ import jax
 import numpy as np
 import pytest
 from commands import TINY, eval_script, export_script, train_script
-from test_checkpoint import CONFIG, SETTINGS
+from setups import CONFIG, SETTINGS
 
 from attjax.export import c as export_c
 from attjax.ppo import train_state

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import exported
 import numpy as np
 import pytest
-from test_export import needs_compiler, random_states
+from exported import needs_compiler, random_states
 
 from attjax.config import settings
 from attjax.control import assurance, features

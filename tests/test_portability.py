@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from commands import TINY, run
-from test_checkpoint import SETTINGS
+from setups import SETTINGS
 
 from attjax import AttitudeEnv, ppo, step
 from attjax.config import run as run_config

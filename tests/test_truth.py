@@ -10,9 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from bodies import LM50, rotated_inertia
+from references import START, reference
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
-from test_dynamics import START, reference
 
 import attjax
 from attjax import dynamics, spacecraft

@@ -1,7 +1,7 @@
 """Judging controllers: episodes, statistics, the paper's tables, figures, playback."""
 
 from attjax.evaluation.episodes import Controller, Episodes, History, fly, random_slews, record
-from attjax.evaluation.statistics import (
+from attjax.evaluation.summary import (
     STATISTICS,
     conditions,
     evaluate,

@@ -5,7 +5,7 @@ from rich.console import Console
 from rich.table import Table
 
 from attjax.evaluation.paper import PAPER_TABLE_2, is_the_papers
-from attjax.evaluation.statistics import STATISTICS
+from attjax.evaluation.summary import STATISTICS
 from attjax.spacecraft import Spacecraft
 
 POINTING_ROWS = {

@@ -2,7 +2,7 @@
 
 Needs the extra basilisk (bsk 2.12.1 wrote the file that is kept):
 
-    PYTHONPATH=tests python tests/data/basilisk_slew.py > tests/data/basilisk_slew.csv
+    PYTHONPATH=tests/helpers python tests/data/basilisk_slew.py > tests/data/basilisk_slew.csv
 
 Columns: body (0: principal moments, 1: the rotated, full tensor), the agent step's torque in
 N m, then Basilisk's modified Rodrigues parameters (MRP) and angular velocity in rad/s at the

@@ -6,6 +6,7 @@ from jax.sharding import PartitionSpec
 
 from attjax import sharding
 from attjax.config import presets
+from attjax.config.run import Config
 from attjax.ppo import train_state
 from attjax.ppo.rollout import rollout
 from attjax.runs import build
@@ -20,6 +21,16 @@ SMALL = {
     "final_learning_rate": 3e-4,
     "updates_per_block": 1,
 }
+
+SETTINGS = presets.PRECISE.replace(
+    frameskips=(5, 20),
+    num_envs=8,
+    rollout_length=4,
+    minibatch_size=8,
+    hidden_sizes=(8,),
+    total_steps=8 * 4 * 4,
+)
+CONFIG = Config("precise", 3, SETTINGS)
 
 
 def settings(updates, preset=presets.PAPER_FAST, **overrides):

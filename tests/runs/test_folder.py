@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_checkpoint import CONFIG
+from setups import CONFIG
 
 from attjax.config import run as run_config
 from attjax.config.presets import PRECISE
@@ -60,7 +60,7 @@ def test_a_run_of_format_5_is_read_as_it_was_meant(tmp_path):
 
 
 def test_the_pretrained_run_is_of_format_5():
-    folder = Path(__file__).parents[1] / "pretrained" / "precise"
+    folder = Path(__file__).parents[2] / "pretrained" / "precise"
     assert json.loads((folder / "config.json").read_text())["format"] == 5
     config = run_folder.read_config(folder)
     assert (config.preset, config.seed, config.settings) == ("precise", 2, PRECISE)

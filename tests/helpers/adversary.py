@@ -5,7 +5,7 @@ does, and takes an allowed one: at random, the one with the highest peak rate af
 that exceeds a first-order forecast of the peak the most.
 
 Example:
-    python tests/adversary.py --spacecraft 1000
+    python tests/helpers/adversary.py --spacecraft 1000
 """
 
 import argparse

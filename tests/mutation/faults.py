@@ -2,22 +2,22 @@
 
 PHYSICS = [
     "tests/test_truth.py",
-    "tests/test_dynamics.py",
-    "tests/test_quaternion.py",
-    "tests/test_env.py",
+    "tests/dynamics/test_propagation.py",
+    "tests/dynamics/test_quaternion.py",
+    "tests/envs/test_attitude.py",
 ]
 LEARNING = [
-    "tests/test_ppo.py",
-    "tests/test_rollout.py",
-    "tests/test_losses.py",
-    "tests/test_vector.py",
+    "tests/ppo/test_train.py",
+    "tests/ppo/test_rollout.py",
+    "tests/ppo/test_losses.py",
+    "tests/envs/test_batch.py",
 ]
-DESCENT = ["tests/test_descent.py", "tests/test_losses.py", "tests/test_rollout.py"]
+DESCENT = ["tests/ppo/test_descent.py", "tests/ppo/test_losses.py", "tests/ppo/test_rollout.py"]
 RUNS = [
-    "tests/test_checkpoint.py",
-    "tests/test_run_folder.py",
-    "tests/test_metrics.py",
-    "tests/test_cli.py",
+    "tests/runs/test_checkpoint.py",
+    "tests/runs/test_folder.py",
+    "tests/runs/test_metrics.py",
+    "tests/commands/test_command_line.py",
 ]
 FAULTS = {
     "sign of the gyroscopic term": (
@@ -55,24 +55,24 @@ FAULTS = {
     "terminal reward added, not replacing": (
         "attjax/envs/reward.py", "jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
         "reward + jnp.where(inside, TERMINAL_BONUS, 0.0), reward)",
-        ["tests/test_reward.py", "tests/test_env.py"],
+        ["tests/envs/test_reward.py", "tests/envs/test_attitude.py"],
     ),
     "time limit before overspeed": (
         "attjax/envs/attitude.py",
         "truncated = ~terminated & (next_state.time", "truncated = (next_state.time",
-        ["tests/test_env.py"],
+        ["tests/envs/test_attitude.py"],
     ),
     "GAE bootstraps over a termination": (
         "attjax/ppo/losses.py",
-        "jnp.where(terminated, 0.0, next_values)", "next_values", ["tests/test_losses.py"],
+        "jnp.where(terminated, 0.0, next_values)", "next_values", ["tests/ppo/test_losses.py"],
     ),
     "GAE runs over the end of an episode": (
         "attjax/ppo/losses.py", "jnp.where(done, 0.0, 1.0)", "jnp.where(terminated, 0.0, 1.0)",
-        ["tests/test_losses.py"],
+        ["tests/ppo/test_losses.py"],
     ),
     "clipped objective without the pessimistic bound": (
         "attjax/ppo/losses.py",
-        "objective = jnp.minimum(", "objective = jnp.maximum(", ["tests/test_losses.py"],
+        "objective = jnp.minimum(", "objective = jnp.maximum(", ["tests/ppo/test_losses.py"],
     ),
     "annealing off by one": (
         "attjax/ppo/train_state.py", "settings.final_learning_rate, settings.gradient_steps",
@@ -89,7 +89,7 @@ FAULTS = {
     "reset state cached": (
         "attjax/envs/attitude.py", "fresh_observation, fresh_state = self.reset_env(key, params)",
         "fresh_observation, fresh_state = self.reset_env(jax.random.key(0), params)",
-        ["tests/test_env.py"],
+        ["tests/envs/test_attitude.py"],
     ),
     "reset state cached in the fused rollout": (
         "attjax/envs/batch.py",
@@ -104,33 +104,33 @@ FAULTS = {
     "closest angle is the last": (
         "attjax/evaluation/episodes.py",
         "closest_angle=jnp.where(closer, angle, so_far.closest_angle)",
-        "closest_angle=angle", ["tests/test_evaluation.py"],
+        "closest_angle=angle", ["tests/evaluation/test_episodes.py"],
     ),
     "closest rate is the last": (
         "attjax/evaluation/episodes.py",
         "closest_rate=jnp.where(closer, rate, so_far.closest_rate)",
-        "closest_rate=rate", ["tests/test_evaluation.py"],
+        "closest_rate=rate", ["tests/evaluation/test_episodes.py"],
     ),
     "impulse of a held torque is that of a pulse, in evaluation": (
         "attjax/evaluation/episodes.py",
-        "context.torque_duration", "(1 / 240)", ["tests/test_evaluation.py"],
+        "context.torque_duration", "(1 / 240)", ["tests/evaluation/test_episodes.py"],
     ),
     "impulse of a held torque is that of a pulse, for a reward": (
         "attjax/envs/attitude.py", "self.context(params).torque_duration,", "INTEGRATION_STEP,",
-        ["tests/test_env.py"],
+        ["tests/envs/test_attitude.py"],
     ),
     "sign in TABLE_5": (
         "attjax/evaluation/paper.py",
         '"slew2": (0.44228, -0.44228', '"slew2": (0.44228, 0.44228',
-        ["tests/test_slew_references.py"],
+        ["tests/control/test_time_optimal.py"],
     ),
     "factor of the time-optimal reference": (
         "attjax/control/time_optimal.py", "return 2 * numerics.square_root(jnp.sum(momentum)",
-        "return 3 * numerics.square_root(jnp.sum(momentum)", ["tests/test_slew_references.py"],
+        "return 3 * numerics.square_root(jnp.sum(momentum)", ["tests/control/test_time_optimal.py"],
     ),
     "reward_scale ignored": (
         "attjax/ppo/rollout.py",
-        "*= setup.settings.task.reward_scale", "*= 1.0", ["tests/test_rollout.py"],
+        "*= setup.settings.task.reward_scale", "*= 1.0", ["tests/ppo/test_rollout.py"],
     ),
     "max_gradient_norm ignored": (
         "attjax/ppo/train_state.py", "if settings.max_gradient_norm > 0:", "if False:", DESCENT,
@@ -151,20 +151,20 @@ FAULTS = {
     ),
     "approximate KL without its ratio": (
         "attjax/ppo/losses.py", "jnp.mean(ratio - 1 - log_ratio)", "jnp.mean(-log_ratio)",
-        ["tests/test_losses.py"],
+        ["tests/ppo/test_losses.py"],
     ),
     "multi-scale features without the period": (
         "attjax/control/features.py", "10 * self.control_period, jnp.log(10 * self.control_period)",
-        "0 * self.control_period, 0 * self.control_period", ["tests/test_features.py"],
+        "0 * self.control_period, 0 * self.control_period", ["tests/control/test_features.py"],
     ),
     "rate mask without its second-order remainder": (
         "attjax/dynamics/rigid_body.py", "MOST_TURNING = 0.5**0.5", "MOST_TURNING = 0.0",
-        ["tests/test_rate_limit.py"],
+        ["tests/control/test_rate_limit.py"],
     ),
     "observation bound without coasting": (
         "attjax/envs/attitude.py",
         "(params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))",
-        "(params.rate_limit + kick)", ["tests/test_observation_space.py"],
+        "(params.rate_limit + kick)", ["tests/envs/test_observation_space.py"],
     ),
     "optimizer not restored": (
         "attjax/runs/checkpoint.py", "    return restored.replace(key=",

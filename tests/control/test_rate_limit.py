@@ -1,4 +1,4 @@
-"""No sequence of allowed actions passes the rate limit; more spacecraft: tests/adversary.py."""
+"""No sequence of allowed actions passes the rate limit; tests/helpers/adversary.py tries more."""
 
 import itertools
 

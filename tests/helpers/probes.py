@@ -1,6 +1,6 @@
 """Probe environments: tiny MDPs whose values and best actions are known.
 
-A learner that gets one of them wrong has a named fault: see each test in test_ppo.py.
+A learner that gets one of them wrong has a named fault: see each test in test_train.py.
 """
 
 import dataclasses

@@ -24,7 +24,7 @@ from attjax.runs import folder as run_folder
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 SHORT = [flag for flag in TINY if not flag.startswith("--frameskips")]
 PEERS = ("torch", "stable-baselines3", "gymnax", "rejax", "tensorboard")
-CAMPAIGNS = ("tests/exported.py", "tests/kills.py", "tests/mutants.py")
+CAMPAIGNS = ("tests/helpers/exported.py", "tests/helpers/kills.py", "tests/mutation/mutants.py")
 NO_FLAG = "--no-flag-of-any-script"
 
 
@@ -115,7 +115,7 @@ def _kind(words):
     if program.startswith("./"):
         return "own program", words
     if program not in CHECKS.keys() | RUNS.keys():
-        raise Unknown(f"{' '.join(words)}: no kind of command that tests/doc_commands.py knows")
+        raise Unknown(f"{' '.join(words)}: no kind of command that doc_commands.py knows")
     return program, arguments
 
 

@@ -9,34 +9,13 @@ import jax.test_util
 import numpy as np
 import pytest
 from bodies import LM50, random_spacecraft, rotated_inertia
-from scipy.integrate import solve_ivp
+from references import NO_TORQUE, START, reference
 from scipy.spatial.transform import Rotation
 
 from attjax import dynamics
 from attjax.dynamics import equations, propagation
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
-
-NO_TORQUE = np.zeros(3)
-START = np.array([0.1, -0.5, 0.3, 0.8, 0.2, -0.3, 0.25])  # q (made unit below), ω
-START[:4] /= np.linalg.norm(START[:4])
-
-
-def reference(start, duration, torque=NO_TORQUE, inertia=LM50):
-    """DOP853 on Eq. 6 and 9 written with matrices; independent of the code under test."""
-    inertia = np.diag(inertia) if np.ndim(inertia) == 1 else np.asarray(inertia)
-
-    def rate(_, y):
-        q, w = y[:4], y[4:]
-        vector = 0.5 * (q[3] * w + np.cross(q[:3], w))
-        return [
-            *vector,
-            -0.5 * q[:3] @ w,
-            *np.linalg.solve(inertia, torque - np.cross(w, inertia @ w)),
-        ]
-
-    solution = solve_ivp(rate, (0, duration), start, "DOP853", rtol=1e-13, atol=1e-15)
-    return solution.y[:, -1]
 
 
 def integrate(start, steps, dt, torque=NO_TORQUE, inertia=LM50):

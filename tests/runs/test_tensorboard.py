@@ -3,7 +3,6 @@
 import csv
 import os
 import shutil
-import struct
 import subprocess
 import sys
 import time
@@ -12,49 +11,18 @@ import jax
 import numpy as np
 import pytest
 from commands import ROOT, STEPS_PER_UPDATE, TINY, one_line_error, run, train_script
-from test_checkpoint import CONFIG
+from setups import CONFIG
 
 from attjax.runs import checkpoint, metrics, metrics_file
 from attjax.runs import folder as run_folder
 
 pytest.importorskip("tensorboardX")
 
-from tensorboardX.proto.event_pb2 import Event, SessionLog
+from events import compared, points, records
+from tensorboardX.proto.event_pb2 import SessionLog
 from tensorboardX.proto.plugin_hparams_pb2 import HParamsPluginData
-from tensorboardX.record_writer import masked_crc32c
 
 from attjax.runs import tensorboard
-
-
-def records(folder):
-    """The events of the folder's only event file, each with its checksums checked."""
-    (path,) = (folder / "tensorboard").iterdir()
-    data = path.read_bytes()
-    while data:
-        size, check = struct.unpack("<QI", data[:12])
-        assert check == masked_crc32c(data[:8])
-        assert struct.unpack("<I", data[12 + size : 16 + size])[0] == masked_crc32c(
-            data[12:][:size]
-        )
-        yield Event.FromString(data[12:][:size])
-        data = data[16 + size :]
-
-
-def points(folder):
-    """{tag: [(step, value)]} of all curves."""
-    curves = {}
-    for event in records(folder):
-        for value in event.summary.value:
-            if not value.tag.startswith("_hparams_"):
-                curves.setdefault(value.tag, []).append((event.step, value.simple_value))
-    return curves
-
-
-def compared(folder):
-    """The tags that the tab HPARAMS shows beside the settings."""
-    (value,) = list(records(folder))[2].summary.value
-    data = HParamsPluginData.FromString(value.metadata.plugin_data.content)
-    return [info.name.tag for info in data.experiment.metric_infos]
 
 
 def expected(folder):

@@ -70,7 +70,8 @@ def test_every_cell_has_a_place_of_its_own_on_the_panel():
 
 def test_a_metric_of_the_registry_is_a_curve_in_tensorboard(two_more, tmp_path):
     pytest.importorskip("tensorboardX")
-    from test_tensorboard import CONFIG, compared, points
+    from events import compared, points
+    from setups import CONFIG
 
     from attjax.runs import tensorboard
 

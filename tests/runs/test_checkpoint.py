@@ -4,24 +4,13 @@ import shutil
 import jax
 import numpy as np
 import pytest
+from setups import CONFIG, SETTINGS
 
 from attjax import AttitudeEnv, ppo
-from attjax.config import presets
-from attjax.config.run import Config
 from attjax.ppo import train_state
 from attjax.runs import build, checkpoint
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
-
-SETTINGS = presets.PRECISE.replace(
-    frameskips=(5, 20),
-    num_envs=8,
-    rollout_length=4,
-    minibatch_size=8,
-    hidden_sizes=(8,),
-    total_steps=8 * 4 * 4,
-)
-CONFIG = Config("precise", 3, SETTINGS)
 
 
 @pytest.fixture(scope="module")

@@ -13,17 +13,10 @@ import time
 import pytest
 from commands import ROOT
 from rich.console import Console
+from rows import EPISODES, LOSSES, row
 
-from attjax.runs import metrics, progress, progress_panel, progress_status
+from attjax.runs import progress, progress_panel, progress_status
 
-LOSSES = {
-    "entropy": 2.345, "approximate_kl": 0.00123, "clip_fraction": 0.043, "policy_loss": -0.01,
-    "value_loss": 1.23e-05, "explained_variance": -0.98765,
-}  # fmt: skip
-EPISODES = {
-    "episode_return": 13807.2, "success_rate": 0.984, "terminal_error_deg": 0.000123,
-    "overspeed_rate": 0.016,
-}  # fmt: skip
 WORST = dict.fromkeys((*LOSSES, *EPISODES), -1.2345e-05)
 
 
@@ -33,12 +26,6 @@ def clock(monkeypatch):
     now = [1000.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
     return now
-
-
-def row(steps, **values):
-    return (
-        dict.fromkeys(metrics.columns()) | {"agent_steps": steps, "episodes": 0} | LOSSES | values
-    )
 
 
 def status(*rows, total=40_000_000):
@@ -168,8 +155,8 @@ def test_an_error_amid_it_leaves_the_last_line(clock, capsys):
 
 SHOW = f"""
 import sys, time
-sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests")!r}]
-from test_progress import row, EPISODES
+sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests" / "helpers")!r}]
+from rows import EPISODES, row
 from attjax.runs import progress
 with progress.Progress(1000, 0) as view:
     for steps in range(100, 1001, 100):

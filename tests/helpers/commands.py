@@ -12,7 +12,7 @@ from attjax.commands import train as train_script
 
 __all__ = ["eval_script", "export_script", "train_script"]
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 TINY = [
     "--device=cpu", "--frameskips=5,20", "--num-envs=16", "--rollout-length=8",
     "--minibatch-size=32", "--hidden-sizes=16", "--updates-per-block=2",

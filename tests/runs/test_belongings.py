@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 from commands import STEPS_PER_UPDATE, train_script
-from test_checkpoint import CONFIG
+from setups import CONFIG
 
 from attjax.config import run as run_config
 from attjax.runs import belongings, checkpoint

@@ -8,8 +8,8 @@ Cosmic-ray makes the changes but does not run the tests: a process that imports 
 takes several times as long as a fork of one that did.
 
 Example:
-    python tests/mutants.py --modules losses reward
-    python tests/mutants.py --modules faults
+    python tests/mutation/mutants.py --modules losses reward
+    python tests/mutation/mutants.py --modules faults
 """
 
 import argparse
@@ -32,9 +32,9 @@ from cosmic_ray.mutating import mutate_code
 from cosmic_ray.operators.operator import Operator
 from faults import FAULTS
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 TESTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mutants"]
-EQUIVALENT = tomllib.loads((ROOT / "tests/equivalent_mutants.toml").read_text())
+EQUIVALENT = tomllib.loads((ROOT / "tests/mutation/equivalent_mutants.toml").read_text())
 OPERATORS = [
     "NumberReplacer", "AddNot", "ZeroIterationForLoop", "ReplaceTrueWithFalse",
     "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd",
@@ -224,7 +224,7 @@ def start(copy, tests) -> int:
     resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT))
     signal.alarm(10 * TIME_LIMIT)  # for one that waits
     sys.dont_write_bytecode = True
-    sys.path.remove(str(ROOT / "tests"))
+    sys.path.remove(str(ROOT / "tests" / "mutation"))
     del sys.modules["faults"]
     os.chdir(copy)
     os.environ["PYTHONPATH"] = str(copy)

@@ -6,7 +6,7 @@ learner and all rows of metrics.csv but their clock must equal, to the bit, thos
 nobody disturbed.
 
 Example:
-    python tests/kills.py --kills 200 --jobs 2
+    python tests/helpers/kills.py --kills 200 --jobs 2
 """
 
 import argparse
@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 KILLS_A_RUN = 8
 TRAIN = [
     sys.executable, str(ROOT / "train.py"), "--device=cpu", "--frameskips=5,20", "--num-envs=16",

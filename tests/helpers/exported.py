@@ -4,7 +4,7 @@ For each control rate: whether C, ONNX and StableHLO decide as JAX does, what th
 says of the slews of Table 5, and the C export's size, operations and time.
 
 Example:
-    python tests/exported.py --checkpoint pretrained/precise --states 100000
+    python tests/helpers/exported.py --checkpoint pretrained/precise --states 100000
 """
 
 import argparse
@@ -18,6 +18,7 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from attjax import AttitudeEnv
 from attjax.evaluation import paper
@@ -61,6 +62,18 @@ def compiler(language: str = "c") -> str | None:
     """The compiler of C or C++, if there is one."""
     names = {"c": ("cc", "gcc"), "c++": ("c++", "g++")}[language]
     return next(filter(None, map(shutil.which, names)), None)
+
+
+needs_compiler = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
+
+
+@functools.cache
+def random_states(flight):
+    """Decisions at random attitudes and at rates below and above the limit."""
+    rng = np.random.default_rng(0)
+    quaternion = rng.normal(size=(2000, 4))
+    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    return flight_check.decisions(flight, quaternion, rng.normal(0, 0.25, (2000, 3)))
 
 
 def write(folder: Path, contents: dict) -> Path:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from bodies import rotated_inertia
 from commands import ROOT, export_script, one_line_error
+from exported import needs_compiler, random_states
 
 from attjax.export import c as export_c
 from attjax.export import flight_check
@@ -18,7 +19,6 @@ from attjax.spacecraft import Spacecraft
 
 PRECISE = ROOT / "pretrained" / "precise"
 STATES = 20_000
-needs_compiler = pytest.mark.skipif(exported.compiler() is None, reason="there is no C compiler")
 
 
 @functools.cache
@@ -50,15 +50,6 @@ OTHERS = [
     ("multiscale", (8, 8, 8), 0.0),
     ("multiscale", (16,), 0.99, WHEELS),
 ]
-
-
-@functools.cache
-def random_states(flight):
-    """Decisions at random attitudes and at rates below and above the limit."""
-    rng = np.random.default_rng(0)
-    quaternion = rng.normal(size=(2000, 4))
-    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
-    return flight_check.decisions(flight, quaternion, rng.normal(0, 0.25, (2000, 3)))
 
 
 def cases():
