@@ -11,7 +11,7 @@ from contextlib import redirect_stdout
 import doc_commands
 import pytest
 from commands import ROOT
-from markdown import COMMANDS, FENCE, Page
+from markdown import COMMANDS, FENCE, Page, write_files
 
 import attjax
 from attjax.config.presets import PRESETS
@@ -53,7 +53,7 @@ def clone(tmp_path, monkeypatch):
 
 @each([page for page in PAGES if page.commands])
 def test_commands_run(page, clone):
-    doc_commands.write_files(page, clone)
+    write_files(page, clone)
     for line, words in page.commands:
         try:
             doc_commands.run(words)
@@ -92,7 +92,7 @@ def test_blocks_have_a_language_and_are_none_of_a_list(page):
 @pytest.mark.parametrize("page, block", PROGRAMS)
 def test_python_runs(page, block, clone):
     """A block runs by itself, and prints what the block of text right after it says."""
-    doc_commands.write_files(page, clone)
+    write_files(page, clone)
     for peer in PEERS:
         if peer in block.text:
             pytest.importorskip(peer)
@@ -204,6 +204,17 @@ def descriptions(module):
 
 def test_the_api_has_every_public_name_of_the_top_level():
     assert {member for module, member, _ in API if not module} == set(attjax.__all__)
+
+
+def test_tests_that_pages_name_are_there():
+    tests = {path.name: path.read_text() for path in (ROOT / "tests").rglob("test_*.py")}
+    pages = [ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
+    text = "\n".join(path.read_text() for path in pages)
+    named = re.findall(r"`(test_\w+\.py)(?:::(test_[\w…]+))?`", text)
+    assert len(named) > 100
+    for file, test in named:
+        pattern = test.replace("…", r"\w*") or r"test_\w+"
+        assert re.search(rf"^def {pattern}\(", tests[file], re.MULTILINE), (file, test)
 
 
 def test_the_reference_can_be_built(tmp_path):

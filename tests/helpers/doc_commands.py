@@ -110,7 +110,7 @@ def _kind(words):
         program, arguments = arguments[0], arguments[1:]
         if program == "-m" and arguments:
             program, arguments = f"-m {arguments[0]}", arguments[1:]
-    if re.fullmatch(r"(benchmarks|tests|docs)/\w+\.py", program):
+    if re.fullmatch(r"(benchmarks|tests|docs)/(\w+/)?\w+\.py", program):
         return "script", [program, *arguments]
     if program.startswith("./"):
         return "own program", words
@@ -246,11 +246,3 @@ def prepare(folder: Path) -> None:
     """Make the folder like a clone, as far as commands read from it."""
     shutil.copytree(ROOT / "pretrained", folder / "pretrained")
     shutil.copytree(ROOT / "docs" / "examples", folder / "docs" / "examples")
-
-
-def write_files(page: markdown.Page, folder: Path) -> None:
-    """Write the files that a page shows: blocks whose first line names them, ``# name``."""
-    for block in page.blocks:
-        named = re.match(r"# ([\w.-]+\.(?:py|toml|json))$", block.text.split("\n")[0])
-        if named:
-            (folder / named[1]).write_text(block.text + "\n")

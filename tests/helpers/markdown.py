@@ -117,3 +117,11 @@ def split(command: str) -> list[str]:
     lexer = shlex.shlex(command, posix=True, punctuation_chars="&>|;")
     lexer.whitespace_split = True
     return list(lexer)
+
+
+def write_files(page: Page, folder: Path) -> None:
+    """Write the files that a page shows: blocks whose first line names them, ``# name``."""
+    for block in page.blocks:
+        named = re.match(r"# ([\w.-]+\.(?:py|toml|json))$", block.text.split("\n")[0])
+        if named:
+            (folder / named[1]).write_text(block.text + "\n")

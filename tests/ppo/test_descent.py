@@ -242,9 +242,8 @@ def test_explained_variance_of_a_constant_target():
     setup = small_setup()
     params = new_learner(setup).params
     samples = random_samples(4)
-    constant = samples.replace(
-        target=jnp.ones(4), inputs=samples.inputs.replace(features=jnp.ones((4, 11)))
-    )
+    inputs = samples.inputs.replace(features=jnp.ones((4, 11)))
+    constant = samples.replace(target=jnp.ones(4), inputs=inputs)
     _, metrics = descent.loss(setup.policy, params, constant, WEIGHTS)
     assert float(metrics["explained_variance"]) == pytest.approx(1, abs=1e-2)
     _, metrics = descent.loss(setup.policy, params, samples.replace(target=jnp.ones(4)), WEIGHTS)
