@@ -40,7 +40,7 @@ PIP = $(@D)/bin/python -m pip --disable-pip-version-check
 test-peers: $(VENV)-gym/installed $(VENV)-rejax/installed
 	$(VENV)-gym/bin/python -m pytest tests/wrappers/test_gymnasium*.py tests/wrappers/test_rendering.py \
 	    tests/wrappers/test_sb3.py tests/wrappers/test_clients.py tests/test_docs.py::test_python_runs \
-	    attjax/wrappers/gymnasium/single.py attjax/wrappers/gymnasium/vector.py attjax/wrappers/sb3.py $(ARGS)
+	    attjax/wrappers/gymnasium attjax/wrappers/sb3.py $(ARGS)
 	$(VENV)-rejax/bin/python -m pytest tests/wrappers/test_gymnax.py tests/test_docs.py::test_python_runs \
 	    attjax/wrappers/gymnax.py $(ARGS)
 
