@@ -5,7 +5,9 @@ Shapes and types are always checked. Values are checked where there are any: ins
 """
 
 import operator
+from typing import Any
 
+import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,12 +21,18 @@ ROUNDING = 1e-5
 """Of an inertia, relatively: arrays are of single precision, and so are a tensor's moments."""
 
 
-def has_value(x) -> bool:
+def has_value(x: Any) -> bool:
     """Whether an array has a value, rather than standing for one while JAX traces."""
     return not isinstance(x, jax.core.Tracer)
 
 
-def real(name: str, x, *shapes: tuple[int | None, ...], low=None, above=None):
+def real(
+    name: str,
+    x: Any,
+    *shapes: tuple[int | None, ...],
+    low: chex.Numeric | None = None,
+    above: chex.Numeric | None = None,
+) -> chex.Array:
     """Return x as an array of floating-point numbers, finite, of one of the shapes and in range.
 
     Args:
@@ -56,7 +64,7 @@ def real(name: str, x, *shapes: tuple[int | None, ...], low=None, above=None):
     return x
 
 
-def integer(name: str, x, low: int, high: int):
+def integer(name: str, x: Any, low: int, high: int) -> chex.Array:
     """Return x as an integer scalar from low to high.
 
     Raises:
@@ -71,7 +79,7 @@ def integer(name: str, x, low: int, high: int):
     return x
 
 
-def action(x, count: int) -> int:
+def action(x: Any, count: int) -> int:
     """Return x, or the one element of an array, as an integer from 0 to count − 1.
 
     For steps from Python.
@@ -88,7 +96,7 @@ def action(x, count: int) -> int:
     return x
 
 
-def actions(x, batch: int, count: int) -> np.ndarray:
+def actions(x: Any, batch: int, count: int) -> np.ndarray:
     """Return x as (batch,) integers from 0 to count − 1, int32, for steps from Python.
 
     Raises:
@@ -105,7 +113,7 @@ def actions(x, batch: int, count: int) -> np.ndarray:
     return x.astype(np.int32)
 
 
-def unit_quaternion(name: str, x):
+def unit_quaternion(name: str, x: Any) -> chex.Array:
     """Return x as a unit quaternion (4,).
 
     Raises:
@@ -119,7 +127,7 @@ def unit_quaternion(name: str, x):
     return x
 
 
-def inertia(x):
+def inertia(x: Any) -> chex.Array:
     """Return x as the inertia of a rigid body, (3,) principal moments or (3, 3), kg m².
 
     Of a body with mass, the moments are positive and none is larger than the other two

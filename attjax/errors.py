@@ -5,7 +5,7 @@ import contextvars
 import functools
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NoReturn
 
 from attjax import streams
@@ -43,7 +43,7 @@ def program(name: str) -> Callable[[Main], Main]:
 
     def decorate(main):
         @functools.wraps(main)
-        def command(argv=None, prog=name) -> int:
+        def command(argv: Sequence[str] | None = None, prog: str = name) -> int:
             with _named(prog), streams.guarded():
                 streams.print_anywhere()
                 return _status(main, argv)
@@ -86,9 +86,10 @@ def one_line_errors(*kinds: type[Exception]) -> Iterator[None]:
     """Turn a :class:`UserError`, exceptions of these kinds and what the system says of a file into
     one line on stderr and exit status 2.
     """
+    told: tuple[type[Exception], ...] = (UserError, *kinds)
     try:
         yield
-    except (UserError, *kinds) as error:
+    except told as error:
         fail(error)
     except OSError as error:  # a folder that may not be entered, a name that is too long, ...
         if error.filename is None:

@@ -71,7 +71,9 @@ def keep_compiled() -> None:
     """
     import jax
 
-    if jax.config.jax_compilation_cache_dir is not None or (folder := cache_folder()) is None:
+    if jax.config.values["jax_compilation_cache_dir"] is not None:
+        return
+    if (folder := cache_folder()) is None:
         return
     jax.config.update("jax_compilation_cache_dir", str(folder))
     if LEAST_COMPILE_TIME.upper() not in os.environ:

@@ -1,6 +1,7 @@
 """How compiled programs share their work out to devices, or to CPU cores as devices."""
 
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import numpy as np
@@ -19,7 +20,7 @@ def mesh(num_devices: int) -> Mesh:
     return Mesh(np.array(jax.devices()[:num_devices]), (AXIS,))
 
 
-def on_devices(num_devices: int, function: Callable, in_specs, out_specs) -> Callable:
+def on_devices(num_devices: int, function: Callable, in_specs: Any, out_specs: Any) -> Callable:
     """``function`` on each device's part of its arguments, with the axis AXIS.
 
     Args:

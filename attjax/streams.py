@@ -11,6 +11,10 @@ import io
 import os
 import sys
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 ERRORS = "attjax.plain"
 """The name of our error handler among the codecs'."""
@@ -31,14 +35,14 @@ class Output(io.FileIO):
 
     failure: OSError | None = None
 
-    def write(self, data: bytes | memoryview) -> int:
+    def write(self, data: "ReadableBuffer", /) -> int:
         """Write, or drop what is to be written."""
         if self.failure is None:
             try:
                 return super().write(data)
             except OSError as error:
                 self.failure = error
-        return len(data)
+        return len(memoryview(data))
 
 
 @contextlib.contextmanager

@@ -5,17 +5,19 @@ This module imports nothing heavy, so that errors are instant.
 
 import math
 import operator
+from collections.abc import Collection
+from typing import Any
 
 LARGEST = 1e30
 
 
-def plain(value):
+def plain(value: Any) -> Any:
     """Tuples for lists and arrays, Python's numbers for NumPy's: they can be hashed and written."""
     value = value.tolist() if hasattr(value, "tolist") else value
     return tuple(map(plain, value)) if isinstance(value, list | tuple) else value
 
 
-def integer(x) -> int | None:
+def integer(x: Any) -> int | None:
     """X as Python's integer, whatever library it is an integer of; None: it is none.
 
     Example:
@@ -29,7 +31,7 @@ def integer(x) -> int | None:
         return None
 
 
-def check_number(name: str, x, low: float, high: float) -> None:
+def check_number(name: str, x: Any, low: float, high: float) -> None:
     """Check a number.
 
     Raises:
@@ -41,7 +43,13 @@ def check_number(name: str, x, low: float, high: float) -> None:
         raise ValueError(f"{name} is {x}; it must be from {low:g} to {high:g}")
 
 
-def check_numbers(name: str, values, low=-math.inf, high=math.inf, count=None) -> None:
+def check_numbers(
+    name: str,
+    values: Any,
+    low: float = -math.inf,
+    high: float = math.inf,
+    count: int | None = None,
+) -> None:
     """Check a tuple of numbers, of ``count`` if that is given.
 
     Raises:
@@ -56,7 +64,7 @@ def check_numbers(name: str, values, low=-math.inf, high=math.inf, count=None) -
         raise ValueError(f"{name} is {shown(values)}; they must be {allowed}")
 
 
-def check_moments(moments, rounding: float) -> None:
+def check_moments(moments: Collection[float], rounding: float) -> None:
     """Check that no principal moment of inertia exceeds the other two together.
 
     Of no rigid body does one: each is made of the squares of two of its three coordinates.
@@ -81,7 +89,7 @@ def _is_number(x):
     return isinstance(x, int | float) and not isinstance(x, bool)
 
 
-def shown(values) -> str:
+def shown(values: object) -> str:
     """As in a user's file."""
     if not isinstance(values, tuple):
         return repr(values)

@@ -104,7 +104,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         plots = evaluation_output.prepare_plots(arguments.plot)
         is_drawn = plots is not None and POLICY in controllers
         metrics = evaluation_output.metrics_rows(arguments.checkpoint) if is_drawn else []
-        json_file, aside = arguments.json, contextlib.nullcontext()
+        json_file = arguments.json
+        aside: contextlib.AbstractContextManager = contextlib.nullcontext()
         if json_file == STDOUT:
             json_file, aside = sys.stdout, contextlib.redirect_stdout(sys.stderr)
         command_line.warn_of_untrained(arguments.frameskip, trained)

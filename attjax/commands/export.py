@@ -109,6 +109,7 @@ def _flight_policy(arguments):
     newest = checkpoint.latest(folder)
     update = checkpoint.best(folder) if arguments.best else newest
     policy, params = checkpoint.restore_network(folder, update)
+    assert update is not None and newest is not None  # or there was nothing to restore
     if callable(policy.features) and arguments.format != "stablehlo":
         raise errors.UserError(
             f"the policy in {folder} sees {config.settings.network.features}, which --format "

@@ -1,5 +1,9 @@
 """What ``train.py`` prints of a run: what it is, how it goes, how it ended."""
 
+from pathlib import Path
+
+import jax
+
 from attjax import errors
 from attjax.config import command_line
 from attjax.config.settings import Settings
@@ -21,8 +25,10 @@ class Terminal(Observer):
         stop: the signals.
     """
 
-    def __init__(self, folder, device, stop: StopSignals):
-        self._folder, self._device, self._stop, self._progress = folder, device, stop, None
+    _progress: Progress  # from compiled() on
+
+    def __init__(self, folder: Path, device: jax.Device, stop: StopSignals):
+        self._folder, self._device, self._stop = folder, device, stop
 
     def started(self, run: Run, lengthened_from: Settings | None) -> None:
         """Print what the run is, and where it stands."""

@@ -121,12 +121,13 @@ def add_settings(group: Group, name: str) -> None:
             continue
         flag = "--" + field.name.replace("_", "-")
         text = f"{help_text.meaning(field)} ({help_text.defaults(field.name)})"
-        options = {"default": argparse.SUPPRESS, "help": text}
-        if field.type is bool:
+        options: dict[str, Any] = {"default": argparse.SUPPRESS, "help": text}
+        kind: Any = field.type
+        if kind is bool:
             group.add_argument(flag, action=argparse.BooleanOptionalAction, **options)
         else:
             metavar = "|".join(field.metadata.get("choices", ())) or (
-                {int: "N", float: "X"}.get(field.type, "N,N,...")
+                {int: "N", float: "X"}.get(kind, "N,N,...")
             )
             group.add_argument(flag, type=_parser_of(field), metavar=metavar, **options)
 

@@ -5,12 +5,13 @@ This module imports nothing heavy, so that ``--help`` is instant.
 
 import dataclasses
 import math
+from typing import Any
 
 from attjax.config import user_functions
 from attjax.values import plain
 
-SEED = {"low": 0, "below": 2**32}
-FRAMESKIP = {"low": 0, "below": 10_500}
+SEED: dict[str, Any] = {"low": 0, "below": 2**32}
+FRAMESKIP: dict[str, Any] = {"low": 0, "below": 10_500}
 """Limits of each, as in :func:`setting`."""
 
 TABLE_2 = 5
@@ -27,7 +28,7 @@ def frameskip_to_judge(trained: tuple[int, ...] = ()) -> int:
     return min(trained or [TABLE_2], key=lambda k: (abs(k - TABLE_2), k))
 
 
-def setting(help: str, *, unit: str = "", symbol: str = "", group: str = "", **limits):
+def setting(help: str, *, unit: str = "", symbol: str = "", group: str = "", **limits: Any) -> Any:
     """A field without default.
 
     Args:
@@ -54,13 +55,14 @@ GROUPS = {
 """Titles of the groups of settings."""
 
 
-def single(name: str, kind: type, help: str, **limits) -> dataclasses.Field:
+def single(name: str, kind: type, help: str, **limits: Any) -> dataclasses.Field:
     """A field, as of :func:`setting`, that belongs to no class: for :func:`check`."""
     field = setting(help, **limits)
     field.name, field.type = name, kind
     return field
 
 
+@dataclasses.dataclass(frozen=True)
 class Checked:
     """Fields that were made by :func:`setting`; each value is checked, and made Python's own."""
 
@@ -69,7 +71,7 @@ class Checked:
             object.__setattr__(self, field.name, check(field, getattr(self, field.name)))
 
 
-def check(field: dataclasses.Field, value):
+def check(field: dataclasses.Field, value: Any) -> Any:
     """Return a value that fits the setting, as Python's own: lists and NumPy's numbers will do.
 
     Raises:
@@ -77,7 +79,7 @@ def check(field: dataclasses.Field, value):
     """
     value = plain(value)
     is_tuple = field.type == tuple[int, ...]
-    kind = int if is_tuple else field.type
+    kind: Any = int if is_tuple else field.type
     elements = value if is_tuple else (value,)
     fits = isinstance(elements, tuple) and 0 < len(elements) <= field.metadata.get("most", math.inf)
     if not (fits and all(_fits(kind, field.metadata, x) for x in elements)):

@@ -45,7 +45,7 @@ def defaults(name: str) -> str:
         >>> defaults("clip"), defaults("discount")
         ('default: 0.2', 'precise: 0.995; paper, paper-fast: 0.99')
     """
-    presets_of = {}
+    presets_of: dict[str, list[str]] = {}
     for preset, values in presets.PRESETS.items():
         presets_of.setdefault(show(values.flat[name]), []).append(preset)
     if len(presets_of) == 1:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import operator
+from typing import Any
 
 from attjax.config.presets import PRECISE, PRESETS
 from attjax.config.settings import Settings
@@ -37,7 +38,7 @@ class Config:
 
 
 def new(
-    preset: str = DEFAULT_PRESET, seed: int = 0, spacecraft: Spacecraft = LM50, **values
+    preset: str = DEFAULT_PRESET, seed: int = 0, spacecraft: Spacecraft = LM50, **values: Any
 ) -> Config:
     """The configuration of a new run: a preset, but for settings given by name.
 

@@ -6,6 +6,7 @@ than a name. This module imports nothing heavy, so that ``--help`` is instant.
 
 import dataclasses
 import functools
+from typing import Any
 
 from attjax.config.fields import FRAMESKIP, GROUPS, Checked, setting
 
@@ -193,7 +194,7 @@ class Settings:
         """All values by name."""
         return {name: getattr(getattr(self, SUBJECT_OF[name]), name) for name in FIELDS}
 
-    def replace(self, **values) -> "Settings":
+    def replace(self, **values: Any) -> "Settings":
         """The same but for values given by their names, whatever their subjects.
 
         Raises:
@@ -202,7 +203,7 @@ class Settings:
         return from_flat(self.flat | values)
 
 
-SUBJECTS = {field.name: field.type for field in dataclasses.fields(Settings)}
+SUBJECTS: dict[str, Any] = {field.name: field.type for field in dataclasses.fields(Settings)}
 """The classes that settings are composed of, by the names of their subjects."""
 
 SUBJECT_OF = {

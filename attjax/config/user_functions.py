@@ -6,6 +6,7 @@ import re
 import sys
 import traceback
 from collections.abc import Callable
+from typing import Any
 
 from attjax.errors import UserValueError
 
@@ -57,7 +58,8 @@ def check(name: str, call: Callable, rank: int) -> None:
         result = call()
     except Exception as error:  # a user's function can raise anything
         raise FunctionError(f"{name} failed: {_described(error)}") from None
-    shape, dtype = getattr(result, "shape", None), getattr(result, "dtype", None)
+    shape = getattr(result, "shape", None)
+    dtype: Any = getattr(result, "dtype", None)
     if shape is None or len(shape) != rank or dtype.kind != "f":
         expected = ("a scalar", "a vector")[rank]
         described = result if shape is None else f"shape {shape} and type {dtype}"

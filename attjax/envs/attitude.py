@@ -89,7 +89,9 @@ class AttitudeEnv:
         rk4_steps = jnp.asarray(1 + frameskip, jnp.asarray(params.inertia).dtype)
         return rk4_steps * INTEGRATION_STEP
 
-    def reset(self, key: chex.PRNGKey, params: EnvParams | None = None):
+    def reset(
+        self, key: chex.PRNGKey, params: EnvParams | None = None
+    ) -> tuple[chex.Array, EnvState]:
         """Start an episode. Returns the observation (11,) and the state.
 
         Raises:
@@ -102,7 +104,13 @@ class AttitudeEnv:
 
     reset_env = reset
 
-    def step(self, key: chex.PRNGKey, state: EnvState, action, params: EnvParams | None = None):
+    def step(
+        self,
+        key: chex.PRNGKey,
+        state: EnvState,
+        action: chex.Numeric,
+        params: EnvParams | None = None,
+    ) -> tuple[chex.Array, EnvState, chex.Array, chex.Array, chex.Array, dict]:
         """One agent step; an episode that ends is followed by a fresh one.
 
         Args:
@@ -131,7 +139,9 @@ class AttitudeEnv:
         )
         return observation, next_state, reward, terminated, truncated, info
 
-    def step_env(self, key: chex.PRNGKey, state: EnvState, action, params: EnvParams):
+    def step_env(
+        self, key: chex.PRNGKey, state: EnvState, action: chex.Numeric, params: EnvParams
+    ) -> tuple[chex.Array, EnvState, chex.Array, chex.Array, dict]:
         """One agent step without reset.
 
         Returns:

@@ -1,6 +1,8 @@
 """Many spacecraft side by side, with new episodes drawn only for those whose episode ended."""
 
 import functools
+from collections.abc import Callable
+from typing import Any, TypeAlias
 
 import chex
 import jax
@@ -19,21 +21,30 @@ CPU_BLOCK = 4096
 PORTIONS = 16
 """New episodes are drawn for a batch's 16th part at a time: rarely more end in one step."""
 
+Stepped: TypeAlias = tuple[chex.Array, chex.ArrayTree, chex.Array, chex.Array, chex.Array, dict]
+"""Observations, states, rewards, terminated, truncated and info of a batch."""
 
-def param_axes(env, params):
+
+def param_axes(env: Any, params: chex.ArrayTree) -> Any:
     """For ``vmap``: 0 for parameters in which the spacecraft differ, None for the others."""
     return jax.tree.map(
         lambda x, default: 0 if np.ndim(x) > np.ndim(default) else None, params, env.default_params
     )
 
 
-def params_of(env, params, row):
+def params_of(env: Any, params: chex.ArrayTree, row: chex.Numeric) -> chex.ArrayTree:
     """The parameters of one spacecraft of a batch."""
     axes = param_axes(env, params)
     return jax.tree.map(lambda x, axis: x if axis is None else x[row], params, axes)
 
 
-def step(env, params, key: chex.PRNGKey, states, actions):
+def step(
+    env: Any,
+    params: chex.ArrayTree,
+    key: chex.PRNGKey,
+    states: chex.ArrayTree,
+    actions: chex.Array,
+) -> Stepped:
     """One agent step of a batch; as ``env.step``, but several times cheaper.
 
     ``vmap(env.step)`` draws a new episode for every spacecraft at every step, to use it where
@@ -52,7 +63,13 @@ def step(env, params, key: chex.PRNGKey, states, actions):
     return step_and_restart(env, params, jax.random.split(key), states, actions)
 
 
-def step_and_restart(env, params, keys: chex.PRNGKey, states, actions):
+def step_and_restart(
+    env: Any,
+    params: chex.ArrayTree,
+    keys: chex.PRNGKey,
+    states: chex.ArrayTree,
+    actions: chex.Array,
+) -> Stepped:
     """As :func:`step`, with two keys: of the steps, and of the new episodes."""
     step_key, fresh_key = keys
     step_keys = jax.random.split(step_key, len(actions))
@@ -70,7 +87,12 @@ def step_and_restart(env, params, keys: chex.PRNGKey, states, actions):
     return observations, states, rewards, terminated, truncated, info
 
 
-def restart(reset, key: chex.PRNGKey, ended, ongoing):
+def restart(
+    reset: Callable[[chex.PRNGKey, chex.Array], chex.ArrayTree],
+    key: chex.PRNGKey,
+    ended: chex.Array,
+    ongoing: chex.ArrayTree,
+) -> chex.ArrayTree:
     """Replace what belongs to ended episodes by fresh ones, a portion of the batch at a time.
 
     Args:
@@ -116,7 +138,14 @@ class Totals:
     donate_argnames="states",
     compiler_options=sharding.COMPILER_OPTIONS,
 )
-def open_loop(env, params, key: chex.PRNGKey, states, actions, num_devices: int = 1):
+def open_loop(
+    env: Any,
+    params: chex.ArrayTree,
+    key: chex.PRNGKey,
+    states: chex.ArrayTree,
+    actions: chex.Array,
+    num_devices: int = 1,
+) -> tuple[chex.ArrayTree, chex.Array, Totals]:
     """Fly a batch through given actions, with automatic reset: the fused rollout.
 
     Args:

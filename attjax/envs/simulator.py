@@ -12,8 +12,7 @@ from attjax import checks, dynamics
 from attjax.spacecraft import LM50, Spacecraft
 
 
-@struct.dataclass
-class EnvState:
+class EnvState(struct.PyTreeNode):
     """State of one spacecraft.
 
     Attributes:
@@ -27,8 +26,7 @@ class EnvState:
     time: chex.Array
 
 
-@struct.dataclass
-class EnvParams:
+class EnvParams(struct.PyTreeNode):
     """Parameters of the spacecraft and its task; all numbers can be traced and vmapped.
 
     Attributes:
@@ -90,7 +88,7 @@ def check_params(params: EnvParams, frameskip: int) -> None:
         raise ValueError(f"params.torque_held is {params.torque_held!r}; it must be True or False")
 
 
-def applied_torque(action: chex.Array, params: EnvParams) -> chex.Array:
+def applied_torque(action: chex.Numeric, params: EnvParams) -> chex.Array:
     """The torque that an action gives: the one way from a decision to what turns the spacecraft.
 
     Args:
@@ -109,7 +107,7 @@ def applied_torque(action: chex.Array, params: EnvParams) -> chex.Array:
 
 def step(
     state: EnvState,
-    action,
+    action: chex.Numeric,
     params: EnvParams | None = None,
     frameskip: int = 20,
 ) -> EnvState:
@@ -143,8 +141,10 @@ def step(
     moving = quaternion, angular_velocity, applied_torque(action, params), params.inertia
     have_values = all(map(checks.has_value, jax.tree.leaves((moving, params.frameskip))))
     propagate = _compiled_propagate if have_values else dynamics.propagate
-    moved = propagate(*moving, frameskip, params.frameskip, params.torque_held)
-    return EnvState(*moved, state.time + 1)
+    quaternion, angular_velocity = propagate(
+        *moving, frameskip, params.frameskip, params.torque_held
+    )
+    return EnvState(quaternion, angular_velocity, state.time + 1)
 
 
 _compiled_propagate = jax.jit(dynamics.propagate, static_argnames=("frameskip", "held"))

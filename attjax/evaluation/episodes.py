@@ -57,7 +57,9 @@ class History:
     torque: chex.Array
 
 
-def random_slews(env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, episodes: int):
+def random_slews(
+    env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, episodes: int
+) -> tuple[chex.Array, EnvState]:
     """Observations (episodes, 11) and states at the start of ``episodes`` random slews."""
     return jax.vmap(env.reset, (0, None))(jax.random.split(key, episodes), params)
 

@@ -14,7 +14,7 @@ from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.simulator import EnvParams, EnvState
 from attjax.evaluation import paper
-from attjax.evaluation.episodes import Controller, Episodes
+from attjax.evaluation.episodes import Controller, Episodes, History
 from attjax.evaluation.paper import PAPER_TABLE_2, is_the_papers
 
 STYLES = ("-", "--", "-.", ":")
@@ -66,11 +66,11 @@ class Flight:
         return evaluation.fly(self.controller, self.env, self.params, key, self.episodes)
 
     @functools.cached_property
-    def table_5(self):
+    def table_5(self) -> tuple[np.ndarray, History]:
         """Time and history of Table 5's slews, which two figures show."""
         return self.record(paper.table_5_slews())
 
-    def record(self, start: EnvState):
+    def record(self, start: EnvState) -> tuple[np.ndarray, History]:
         """Time in s, (steps,), and the history of slews from the given states."""
         steps = int(self.params.max_steps_in_episode)
         key = jax.random.key(self.seed)

@@ -127,7 +127,7 @@ def _source_values(flight, prefix):
     }
 
 
-def _inputs(flight) -> CInputs:
+def _inputs(flight: FlightPolicy) -> CInputs:
     return FORMS[flight.policy.features].c(flight.control_period)
 
 

@@ -2,6 +2,8 @@
 
 import dataclasses
 import textwrap
+from collections.abc import Callable
+from typing import SupportsFloat
 
 import numpy as np
 
@@ -9,7 +11,7 @@ NUMBERS_A_LINE = 8
 COMMENT_WIDTH = 97
 
 
-def number(x) -> str:
+def number(x: SupportsFloat) -> str:
     """A constant that is exactly this float32, to the sign of a zero.
 
     Raises:
@@ -26,13 +28,13 @@ def number(x) -> str:
     return str(single) + "f"
 
 
-def double(x) -> str:
+def double(x: SupportsFloat) -> str:
     """A constant that is exactly this number; NAN and INFINITY are those of math.h."""
     names = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
     return names.get(repr(float(x)), repr(float(x)))
 
 
-def table(values, form=number) -> str:
+def table(values: np.ndarray, form: Callable[[SupportsFloat], str] = number) -> str:
     """An initialiser of a vector, some numbers a line, or of a matrix, a row a line."""
     values = np.asarray(values)
     if values.ndim == 1:
@@ -43,7 +45,7 @@ def table(values, form=number) -> str:
     return "{\n    " + ",\n    ".join(rows) + "}"
 
 
-def row(values, form=number) -> str:
+def row(values: np.ndarray, form: Callable[[SupportsFloat], str] = number) -> str:
     """An initialiser of a vector, in one line."""
     return "{" + ", ".join(map(form, np.asarray(values))) + "}"
 

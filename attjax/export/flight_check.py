@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 
+import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -40,7 +41,9 @@ class Decisions:
     clear: np.ndarray
 
 
-def decisions(flight: FlightPolicy, quaternion, angular_velocity) -> Decisions:
+def decisions(
+    flight: FlightPolicy, quaternion: chex.Array, angular_velocity: chex.Array
+) -> Decisions:
     """What the policy does at the states (states, 4) and (states, 3)."""
     quaternion, angular_velocity = (
         np.asarray(x, np.float32) for x in (quaternion, angular_velocity)

@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import hashlib
 
+import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -58,7 +59,7 @@ class FlightPolicy:
         """The spacecraft as the policy knows it, in float32."""
         return self.env.context(self.env.default_params)
 
-    def act_in_float32(self, observation, context: Context):
+    def act_in_float32(self, observation: chex.Array, context: Context) -> chex.Array:
         """The action for an observation (11,) of any type; the context is its own, float32."""
         del context
         single = observation.astype(jnp.float32)
@@ -120,7 +121,9 @@ def parameter_hash(params: dict) -> str:
     return digest.hexdigest()[:16]
 
 
-def decide(flight: FlightPolicy, quaternion, angular_velocity):
+def decide(
+    flight: FlightPolicy, quaternion: chex.Array, angular_velocity: chex.Array
+) -> tuple[chex.Array, chex.Array]:
     """The action, an int32 scalar, and the logits (actions,) for one state; pure JAX.
 
     Args:

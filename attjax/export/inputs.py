@@ -5,7 +5,7 @@ All numbers are those of :mod:`attjax.control.features` and :mod:`attjax.dynamic
 is only how the formats spell them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +28,7 @@ class CInputs(NamedTuple):
     """
 
     template: str
-    values: dict[str, str | int | float]
+    values: Mapping[str, object]
     constants: int
     tanh: int
     other: int
@@ -110,7 +110,7 @@ def _multiscale_in_onnx(graph, period):
     return graph.add("Concat", [scaled, plain], "features", axis=1)
 
 
-FORMS = {
+FORMS: dict[str | Callable, Form] = {
     "state": Form(_state_in_c, _state_in_onnx),
     "multiscale": Form(_multiscale_in_c, _multiscale_in_onnx),
 }

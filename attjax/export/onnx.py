@@ -6,8 +6,11 @@ Inputs, float32: ``quaternion`` (batch, 4), unit error quaternions, scalar last,
 Where the policy comes from and what it was trained for is in the model's metadata.
 """
 
+from typing import Any
+
 import numpy as np
 import onnx
+from numpy.typing import ArrayLike
 from onnx import TensorProto, helper, numpy_helper
 
 import attjax
@@ -28,14 +31,14 @@ class Graph:
     def __init__(self):
         self.nodes, self.constants = [], []
 
-    def constant(self, name: str, values) -> str:
+    def constant(self, name: str, values: ArrayLike) -> str:
         """Add a constant, float32 unless it is of integers or booleans; returns its name."""
         values = np.asarray(values)
         values = values.astype(np.float32) if values.dtype.kind == "f" else values
         self.constants.append(numpy_helper.from_array(values, name))
         return name
 
-    def add(self, operator: str, inputs: list[str], output: str, **attributes) -> str:
+    def add(self, operator: str, inputs: list[str], output: str, **attributes: Any) -> str:
         """Add a node; returns the name of its output."""
         self.nodes.append(helper.make_node(operator, inputs, [output], output, **attributes))
         return output

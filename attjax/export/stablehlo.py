@@ -17,6 +17,7 @@ and nothing else. Both have the hash of the parameters in the name of their func
 import contextlib
 import functools
 import textwrap
+from collections.abc import Callable
 
 import flatbuffers  # noqa: F401  jax.export needs it only when it writes; fail here instead
 import jax
@@ -43,7 +44,7 @@ def files(
 
 
 def _export(flight, platforms):
-    decide = functools.partial(flight_policy.decide, flight)
+    decide: Callable = functools.partial(flight_policy.decide, flight)
     decide.__name__ = f"attjax_policy_{flight_policy.parameter_hash(flight.params)}"
     shapes = (jax.ShapeDtypeStruct((size,), jnp.float32) for size in (4, 3))
     with _no_source_lines():

@@ -76,13 +76,13 @@ def optimize(
     return learner, jax.tree.map(jnp.mean, metrics)
 
 
-def take_blocks(x, num_blocks, chosen):
+def take_blocks(x: chex.Array, num_blocks: int, chosen: chex.Array) -> chex.Array:
     """Some of the equal blocks that the first axis of x is made of, one after another."""
     flat = jnp.take(x.reshape(num_blocks, -1), chosen, axis=0, mode="clip")
     return flat.reshape(-1, *x.shape[1:])
 
 
-def random_order(key, count: int) -> chex.Array:
+def random_order(key: chex.PRNGKey, count: int) -> chex.Array:
     """(count,) a random permutation of range(count).
 
     Sorts words that end in the index and begin with random bits: eight times as fast on CPU as

@@ -1,12 +1,20 @@
 """PPO's advantage estimate and losses, as plain functions of arrays."""
 
+from collections.abc import Callable
+
 import chex
 import jax
 import jax.numpy as jnp
 
 
 def generalized_advantages(
-    rewards, values, next_values, terminated, done, discount, gae_lambda
+    rewards: chex.Array,
+    values: chex.Array,
+    next_values: chex.Array,
+    terminated: chex.Array,
+    done: chex.Array,
+    discount: chex.Numeric,
+    gae_lambda: float,
 ) -> chex.Array:
     """Generalised advantage estimates, right at terminations and at truncations.
 
@@ -43,7 +51,12 @@ def generalized_advantages(
     return advantages
 
 
-def clipped_policy_loss(log_probability, old_log_probability, advantage, clip):
+def clipped_policy_loss(
+    log_probability: chex.Array,
+    old_log_probability: chex.Array,
+    advantage: chex.Array,
+    clip: float,
+) -> tuple[chex.Array, dict[str, chex.Array]]:
     """Eq. 4 with the sign of a loss, averaged over (batch,) arrays.
 
     Returns:
@@ -59,7 +72,7 @@ def clipped_policy_loss(log_probability, old_log_probability, advantage, clip):
     return -jnp.mean(objective), diagnostics
 
 
-def pick(log_probabilities, action):
+def pick(log_probabilities: chex.Array, action: chex.Array) -> chex.Array:
     """(samples,) log probability of each taken action, from those of all (actions, samples).
 
     A masked sum: gathers and their gradients, scatters, do not vectorise.
@@ -73,7 +86,7 @@ def entropy(log_probabilities: chex.Array) -> chex.Array:
     return -jnp.sum(jnp.exp(log_probabilities) * log_probabilities, axis=0)
 
 
-def standardize(x: chex.Array, mean=jnp.mean) -> chex.Array:
+def standardize(x: chex.Array, mean: Callable[[chex.Array], chex.Array] = jnp.mean) -> chex.Array:
     """Shift and scale to mean 0 and standard deviation 1, as ``mean`` averages."""
     centred = x - mean(x)
     return centred / (jnp.sqrt(mean(centred**2)) + 1e-8)

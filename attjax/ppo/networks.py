@@ -98,7 +98,13 @@ class Policy:
         """From features to V(s)."""
         return MLP(self.hidden_sizes, 1, 1.0)
 
-    def init(self, policy_key, value_key, observation, context) -> dict:
+    def init(
+        self,
+        policy_key: chex.PRNGKey,
+        value_key: chex.PRNGKey,
+        observation: chex.Array,
+        context: Context,
+    ) -> dict:
         """Random parameters {"policy": ..., "value": ...} for such an observation (size,)."""
         features = self.encode(observation, context).features[None]
         return {
@@ -106,9 +112,11 @@ class Policy:
             "value": self.value_network.init(value_key, features),
         }
 
-    def encode(self, observation: chex.Array, context: Context | None) -> Inputs:
+    def encode(self, observation: chex.Array, context: Context) -> Inputs:
         """Features and mask of one observation (size,); no parameters are involved."""
-        features = FEATURES.get(self.features, self.features)(observation, context)
+        given = self.features
+        function = FEATURES[given] if isinstance(given, str) else given
+        features = function(observation, context)
         allowed = jnp.ones(self.num_actions, bool)
         if self.rate_margin > 0:
             angular_velocity = observation[observations.ANGULAR_VELOCITY]
@@ -117,7 +125,7 @@ class Policy:
 
     def logits(self, params: dict, inputs: Inputs) -> chex.Array:
         """(actions, samples) of (samples, ...) inputs, MASKED_LOGIT where masked."""
-        logits = self.policy_network.apply(params["policy"], inputs.features)
+        logits: chex.Array = self.policy_network.apply(params["policy"], inputs.features)
         return jnp.where(inputs.allowed.T, logits, MASKED_LOGIT)
 
     def log_probabilities(self, params: dict, inputs: Inputs) -> chex.Array:

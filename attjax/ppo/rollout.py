@@ -99,7 +99,7 @@ def fly(
     return learner, results
 
 
-def sample(log_probabilities, uniform) -> chex.Array:
+def sample(log_probabilities: chex.Array, uniform: chex.Array) -> chex.Array:
     """(samples,) random actions, by inversion of the cumulative (actions, samples) probabilities.
 
     It takes one random number from [0, 1) a sample, where the Gumbel trick takes one an action
@@ -113,7 +113,7 @@ def sample(log_probabilities, uniform) -> chex.Array:
     return first_row((cumulative > threshold) & (probabilities > 0))
 
 
-def first_row(is_candidate) -> chex.Array:
+def first_row(is_candidate: chex.Array) -> chex.Array:
     """(samples,) the first true row of each column; what argmax gives, but it vectorises."""
     rows = len(is_candidate)
     return jnp.min(jnp.where(is_candidate, jnp.arange(rows)[:, None], rows - 1), axis=0)

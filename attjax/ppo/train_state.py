@@ -67,8 +67,7 @@ class Setup:
         return self.settings.ppo.num_envs // self.num_devices
 
 
-@struct.dataclass
-class Learner:
+class Learner(struct.PyTreeNode):
     """All that changes during training.
 
     Attributes:
@@ -83,8 +82,8 @@ class Learner:
         update: updates done, int32.
     """
 
-    params: dict
-    optimizer: dict
+    params: chex.ArrayTree
+    optimizer: chex.ArrayTree
     states: chex.ArrayTree
     observation: chex.Array
     score: chex.Array

@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -33,11 +34,12 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
     Raises:
         FunctionError: the features are a user's function that cannot be used.
     """
-    features = settings.network.features
-    if features not in FEATURES:
-        features = user_functions.resolve(features)
+    name = settings.network.features
+    features: str | Callable = name
+    if name not in FEATURES:
+        features = user_functions.resolve(name)
         call = functools.partial(jax.eval_shape, features, *_first_sight(craft))
-        user_functions.check(f"features {settings.network.features}", call, rank=1)
+        user_functions.check(f"features {name}", call, rank=1)
     return Policy(
         features, settings.network.hidden_sizes, craft.num_actions, settings.network.rate_margin
     )
@@ -122,8 +124,8 @@ def env_params(setup: train_state.Setup) -> simulator.EnvParams:
     """
     settings, params = setup.settings, setup.env.default_params
     craft = setup.env.spacecraft
-    limits = [craft.max_steps(frameskip) for frameskip in settings.task.frameskips]
-    limits = np.minimum(limits, settings.task.max_episode_steps).astype(np.int32)
+    longest = [craft.max_steps(frameskip) for frameskip in settings.task.frameskips]
+    limits = np.minimum(longest, settings.task.max_episode_steps).astype(np.int32)
     if setup.groups == 1:
         return params.replace(max_steps_in_episode=jnp.asarray(limits[0]))
     frameskips = np.array(settings.task.frameskips, np.int32)

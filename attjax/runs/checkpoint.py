@@ -10,7 +10,6 @@ import functools
 import os
 import re
 import shutil
-import tempfile
 from pathlib import Path
 
 import jax
@@ -22,11 +21,9 @@ from attjax.ppo.train_state import Learner
 from attjax.runs import belongings, build, quiet
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
+from attjax.runs.plain_path import plain
 
 NEWEST_KEPT = 3
-PLAIN = r"[A-Za-z0-9_./ +=,@-]*"
-"""Paths that Orbax takes as they are. It looks for parts of a checkpoint by patterns that begin
-with the path, so that one with brackets would find none."""
 
 
 class Saver:
@@ -80,7 +77,7 @@ class Saver:
         shutil.rmtree(saving, ignore_errors=True)
         saving.mkdir()
         whole = saving / "checkpoint"
-        with _plain(saving) as place:
+        with plain(saving) as place:
             saved = {name: ocp.args.StandardSave(item) for name, item in items.items()}
             self._orbax.save(place / whole.name, args=ocp.args.Composite(**saved))
             self._check(place / whole.name, items)
@@ -152,19 +149,6 @@ def _saved(folder):
         return belongings.checkpoints(folder, run)
     except OSError as error:
         raise FolderError(f"{folder} cannot be read: {error.strerror}") from None
-
-
-@contextlib.contextmanager
-def _plain(path):
-    """The path, or a link to it whose name Orbax does not take for a pattern."""
-    path = path.absolute()
-    if re.fullmatch(PLAIN, str(path)):
-        yield path
-        return
-    with tempfile.TemporaryDirectory() as scratch:
-        link = Path(scratch) / "folder"
-        link.symlink_to(path, target_is_directory=True)
-        yield link
 
 
 def restore_learner(folder: Path, template: Learner) -> Learner:
@@ -240,7 +224,7 @@ def _restore(folder, update, item, template):
     )
     with quiet.orbax() as failures:
         try:
-            with ocp.StandardCheckpointer() as checkpointer, _plain(path) as place:
+            with ocp.StandardCheckpointer() as checkpointer, plain(path) as place:
                 return checkpointer.restore(place / item, target)
         except Exception as error:  # Orbax raises many kinds for damaged files
             failures.append(_first_sentence(error))

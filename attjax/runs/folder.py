@@ -7,11 +7,14 @@ folder that ``--resume`` goes on from: files are replaced in one step, never edi
 
 import contextlib
 import dataclasses
+import importlib
 import json
 import os
 import re
 import uuid
+from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 from attjax import spacecraft
 from attjax.config import settings
@@ -19,8 +22,9 @@ from attjax.config.run import Config
 from attjax.errors import UserError, warning_line
 from attjax.runs import belongings
 
+fcntl: ModuleType | None
 try:
-    import fcntl
+    fcntl = importlib.import_module("fcntl")
 except ImportError:  # Windows, where runs are not kept apart
     fcntl = None
 
@@ -34,7 +38,7 @@ class FolderError(UserError):
 
 
 @contextlib.contextmanager
-def writing(folder: Path):
+def writing(folder: Path) -> Iterator[None]:
     """Turn the operating system's errors into one line that names the folder."""
     try:
         yield
@@ -43,7 +47,7 @@ def writing(folder: Path):
 
 
 @contextlib.contextmanager
-def opened(folder: Path):
+def opened(folder: Path) -> Iterator[None]:
     """Make the folder if there is none and keep other training processes out of it.
 
     The lock is the operating system's, and ends with the process, however that ends; what the

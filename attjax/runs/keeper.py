@@ -4,6 +4,7 @@ import dataclasses
 import importlib
 import time
 from pathlib import Path
+from typing import Protocol
 
 from attjax.config import run as run_config
 from attjax.errors import UserError
@@ -47,6 +48,13 @@ class Place:
                 ) from None
 
 
+class _Log(Protocol):
+    """A file of rows of metrics."""
+
+    def append(self, row: dict) -> None:
+        """Add one row."""
+
+
 class Keeper:
     """Keeps one run; a context manager. Its folder must be open.
 
@@ -78,7 +86,7 @@ class Keeper:
         steps = int(saved.update) * config.settings.ppo.steps_per_update
         file = metrics_file.MetricsFile(folder, steps)
         self.run.go_on_from(saved, file.kept, file.wall_s)
-        self._logs = [file]
+        self._logs: list[_Log] = [file]
         if place.tensorboard:
             from attjax.runs import tensorboard
 

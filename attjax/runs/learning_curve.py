@@ -24,18 +24,18 @@ def write(rows: list[dict[str, str]], is_the_papers: bool, folder: Path) -> list
 @canvas.own_style()
 def _draw(rows, is_the_papers, folder):
     steps = [int(row["agent_steps"]) / 1e6 for row in rows]
-    drawn = [metric for metric in metrics.METRICS if metric.curve]
+    drawn = [(metric.name, metric.curve) for metric in metrics.METRICS if metric.curve]
     figure, axes = canvas.subplots(len(drawn), 1, figsize=(7, 7 / 3 * len(drawn)), sharex=True)
-    for axis, metric in zip(axes, drawn):
-        axis.plot(steps, [float(row[metric.name] or "nan") for row in rows], "k", linewidth=1)
-        axis.set_ylabel(metric.curve.label)
+    for axis, (name, curve) in zip(axes, drawn):
+        axis.plot(steps, [float(row[name] or "nan") for row in rows], "k", linewidth=1)
+        axis.set_ylabel(curve.label)
         axis.grid(alpha=0.3)
-        if is_the_papers and metric.name == "episode_return":
+        if is_the_papers and name == "episode_return":
             axis.axhline(
                 PAPERS_PLATEAU, color="tab:red", linestyle="--", label="the paper's plateau"
             )
             axis.legend()
-        if metric.curve.is_log:
+        if curve.is_log:
             axis.set_yscale("log")
     axes[-1].set_xlabel("agent steps (millions)")
     axes[0].set_title("Learning: training episodes")

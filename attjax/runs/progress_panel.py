@@ -67,7 +67,7 @@ def _bar(status, state, width):
 def _first_cells(status, column, trend_width):
     if not status.has_episodes:
         width = WIDTHS[0] + (trend_width + 1 if trend_width else 0)
-        words = ("no whole episode", "has ended yet")
+        words: tuple[str, ...] = ("no whole episode", "has ended yet")
         if not status.has_blocks:
             words = ("the first block runs",)
         blank = ("",) * (len(column) - len(words))

@@ -37,7 +37,9 @@ class Run:
         self.config, self.setup = config, setup
         self.env_params = build.env_params(setup)
         self.learner = train_state.init(setup, self.env_params, jax.random.key(config.seed))
-        self.update, self.rows, self.wall_s, self._clock = 0, [], 0.0, None
+        self.update, self.wall_s = 0, 0.0
+        self.rows: list[dict] = []
+        self._clock: float | None = None
 
     def go_on_from(self, learner: Learner, rows: list[dict], wall_s: float) -> None:
         """Take a saved learner for the one that it has; its rows of metrics, and its clock."""

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from attjax.config import run as run_config
 from attjax.config.settings import Settings
@@ -57,7 +58,7 @@ def train(
     folder: str | Path | Place | None = None,
     callback: Callable[[dict], bool | None] | Observer | None = None,
     debug_nans: bool = False,
-    **settings,
+    **settings: Any,
 ) -> Run:
     """Train a policy by PPO.
 
@@ -86,24 +87,42 @@ def train(
         >>> run.agent_steps, run.env.frameskip
         (2048, 20)
     """
-    given = {"preset": preset, "seed": seed, "spacecraft": spacecraft}
-    if isinstance(preset, Settings):
-        given, settings = given | {"preset": run_config.CUSTOM}, preset.flat | settings
-    given = {name: x for name, x in (given | settings).items() if x is not None}
-    if not isinstance(callback, Observer):
-        callback = Observer() if callback is None else _Callback(callback)
+    given = _given(settings, preset=preset, seed=seed, spacecraft=spacecraft)
+    observer = _observer(callback)
     if folder is None:
-        config = run_config.new(**given)
-        run = Run(config, build.of_config(config))
-        callback.started(run, None)
-        _train(run, callback, None, debug_nans)
-        return run
+        return _train_in_memory(given, observer, debug_nans)
     place = folder if isinstance(folder, Place) else Place(folder=Path(folder))
+    return _train_in_folder(place, given, observer, debug_nans)
+
+
+def _given(settings, **start):
+    """What is asked of the run, by name: preset, seed and spacecraft, and settings."""
+    if isinstance(start["preset"], Settings):
+        settings = start["preset"].flat | settings
+        start |= {"preset": run_config.CUSTOM}
+    return {name: x for name, x in (start | settings).items() if x is not None}
+
+
+def _observer(callback):
+    if isinstance(callback, Observer):
+        return callback
+    return Observer() if callback is None else _Callback(callback)
+
+
+def _train_in_memory(given, observer, debug_nans):
+    config = run_config.new(**given)
+    run = Run(config, build.of_config(config))
+    observer.started(run, None)
+    _train(run, observer, None, debug_nans)
+    return run
+
+
+def _train_in_folder(place, given, observer, debug_nans):
     with run_folder.opened(place.folder):
         keeper = Keeper(place, given)
-        callback.started(keeper.run, keeper.lengthened_from)
+        observer.started(keeper.run, keeper.lengthened_from)
         with keeper:
-            _train(keeper.run, callback, keeper, debug_nans)
+            _train(keeper.run, observer, keeper, debug_nans)
             keeper.save()
     return keeper.run
 

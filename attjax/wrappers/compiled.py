@@ -6,22 +6,27 @@ Observations are float32; what ``info`` describes comes as one dictionary withou
 
 import functools
 
+import chex
 import jax
 import jax.numpy as jnp
 
 from attjax import sharding
 from attjax.envs import batch
+from attjax.envs.attitude import AttitudeEnv
+from attjax.envs.simulator import EnvParams, EnvState
 
 
 @functools.partial(jax.jit, static_argnames="env")
-def reset(env, params, key):
+def reset(env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey) -> tuple[chex.Array, EnvState]:
     """Start an episode. Returns the observation and the state."""
     observation, state = env.reset(key, params)
     return _single(observation), state
 
 
 @functools.partial(jax.jit, static_argnames="env", donate_argnames="state")
-def step(env, params, key, state, action):
+def step(
+    env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, state: EnvState, action: chex.Numeric
+) -> tuple[EnvState, tuple]:
     """One agent step without reset; the state is donated.
 
     Args:
@@ -39,14 +44,16 @@ def step(env, params, key, state, action):
 
 
 @functools.partial(jax.jit, static_argnames="env")
-def reset_batch(env, params, keys):
+def reset_batch(
+    env: AttitudeEnv, params: EnvParams, keys: chex.PRNGKey
+) -> tuple[chex.Array, EnvState]:
     """Start an episode for each key. Returns the observations and the states."""
     observations, states = jax.vmap(env.reset, (0, None))(keys, params)
     return _single(observations), states
 
 
 @jax.jit
-def choose(mask, new, old):
+def choose(mask: chex.Array, new: chex.ArrayTree, old: chex.ArrayTree) -> chex.ArrayTree:
     """The rows of one pytree where the mask (batch,) says so, else those of another."""
     return jax.tree.map(
         lambda a, b: jnp.where(mask.reshape(-1, *[1] * (a.ndim - 1)), a, b), new, old
@@ -59,7 +66,9 @@ def choose(mask, new, old):
     donate_argnames="states",
     compiler_options=sharding.COMPILER_OPTIONS,
 )
-def step_batch(env, params, key, states, actions):
+def step_batch(
+    env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, states: EnvState, actions: chex.Array
+) -> tuple[chex.PRNGKey, EnvState, tuple]:
     """One agent step of all spacecraft, ended episodes restarted; the states are donated.
 
     Returns:
@@ -80,7 +89,14 @@ def step_batch(env, params, key, states, actions):
     donate_argnames="states",
     compiler_options=sharding.COMPILER_OPTIONS,
 )
-def step_batch_later_reset(env, params, key, states, actions, ended):
+def step_batch_later_reset(
+    env: AttitudeEnv,
+    params: EnvParams,
+    key: chex.PRNGKey,
+    states: EnvState,
+    actions: chex.Array,
+    ended: chex.Array,
+) -> tuple[chex.PRNGKey, EnvState, tuple]:
     """One agent step of the spacecraft that have not ended, and a new episode for the others.
 
     Args:

@@ -6,12 +6,16 @@
 need gymnax, which no extra of attjax installs.
 """
 
+import dataclasses
 import functools
+from typing import Any
 
+import chex
 import jax
 from gymnax.environments import environment, spaces
 
 from attjax.envs.attitude import AttitudeEnv
+from attjax.envs.simulator import EnvParams, EnvState
 
 
 class GymnaxEnv(environment.Environment):
@@ -43,11 +47,11 @@ class GymnaxEnv(environment.Environment):
         self.describe = describe
 
     @property
-    def default_params(self):
+    def default_params(self) -> EnvParams:
         """As the environment's, with a plain integer for the time limit: evosax hashes it."""
         env = self.attitude_env
         limit = env.spacecraft.max_steps(env.frameskip)
-        return env.default_params.replace(max_steps_in_episode=limit)
+        return dataclasses.replace(env.default_params, max_steps_in_episode=limit)
 
     @property
     def name(self) -> str:
@@ -60,12 +64,24 @@ class GymnaxEnv(environment.Environment):
         return self.attitude_env.num_actions
 
     @functools.partial(jax.jit, static_argnames="self")
-    def step(self, key, state, action, params=None):
+    def step(
+        self,
+        key: chex.PRNGKey,
+        state: EnvState,
+        action: chex.Numeric,
+        params: EnvParams | None = None,
+    ) -> tuple[chex.Array, EnvState, chex.Array, chex.Array, chex.Array, dict[str, Any]]:
         """As the environment's: six values."""
         *results, info = self.attitude_env.step(key, state, action, params)
         return self._told(*results, info=info)
 
-    def step_env(self, key, state, action, params):
+    def step_env(
+        self,
+        key: chex.PRNGKey,
+        state: EnvState,
+        action: chex.Numeric,
+        params: EnvParams,
+    ) -> tuple[chex.Array, EnvState, chex.Array, chex.Array, dict[str, Any]]:
         """As the environment's: five values."""
         *results, info = self.attitude_env.step_env(key, state, action, params)
         return self._told(*results, info=info)
@@ -77,16 +93,16 @@ class GymnaxEnv(environment.Environment):
             del info["score"], info["torque"], info["outcome"]
         return observation, state, reward * self.reward_scale, *ends, info
 
-    def reset_env(self, key, params):
+    def reset_env(self, key: chex.PRNGKey, params: EnvParams) -> tuple[chex.Array, EnvState]:
         """As the environment's."""
         return self.attitude_env.reset_env(key, params)
 
-    def observation_space(self, params):
+    def observation_space(self, params: EnvParams) -> spaces.Box:
         """The environment's, of gymnax's class."""
         box = self.attitude_env.observation_space(params)
         return spaces.Box(box.low, box.high, box.shape, box.dtype)
 
-    def action_space(self, params=None):
+    def action_space(self, params: EnvParams | None = None) -> spaces.Discrete:
         """The environment's, of gymnax's class."""
         return spaces.Discrete(self.attitude_env.action_space(params).n)
 
@@ -98,7 +114,13 @@ class FiveValueEnv(GymnaxEnv):
     """
 
     @functools.partial(jax.jit, static_argnames="self")
-    def step(self, key, state, action, params=None):
+    def step(
+        self,
+        key: chex.PRNGKey,
+        state: EnvState,
+        action: chex.Numeric,
+        params: EnvParams | None = None,
+    ) -> tuple[chex.Array, EnvState, chex.Array, chex.Array, dict[str, Any]]:
         """Observation (11,), state, reward, done, info."""
         observation, state, reward, terminated, truncated, info = super().step(
             key, state, action, params

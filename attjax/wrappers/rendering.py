@@ -4,6 +4,7 @@ Matplotlib draws into memory with a canvas of its own; its global state stays as
 """
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
@@ -35,7 +36,15 @@ class Renderer:
         num_envs: spacecraft.
     """
 
-    def __init__(self, inertia, rate_limit, goal_angle, control_period, max_steps, num_envs=1):
+    def __init__(
+        self,
+        inertia: npt.ArrayLike,
+        rate_limit: float,
+        goal_angle: float,
+        control_period: float,
+        max_steps: int,
+        num_envs: int = 1,
+    ):
         self._period = control_period
         self._times = control_period * np.arange(max_steps + 1)
         self._curves = np.full((2, max_steps + 1, num_envs), np.nan)
@@ -44,7 +53,9 @@ class Renderer:
         with canvas.own_style():
             self._draw_background(rate_limit, np.rad2deg(goal_angle))
 
-    def record(self, quaternion, angular_velocity, time) -> None:
+    def record(
+        self, quaternion: np.ndarray, angular_velocity: np.ndarray, time: np.ndarray
+    ) -> None:
         """Note the states (num_envs, 4), (num_envs, 3) and the agent steps (num_envs,) so far."""
         self._quaternion = quaternion
         time = np.minimum(time, len(self._times) - 1)  # stepped on, after the end
@@ -67,6 +78,7 @@ class Renderer:
         self._canvas.restore_region(self._background)
         self._draw_body(rotation(self._quaternion[index]))
         for line in self._lines:
+            assert line.axes is not None  # they drew it
             line.axes.draw_artist(line)
         self._scene.draw_artist(self._words)
         return np.array(self._canvas.buffer_rgba())[..., :3].copy()
@@ -125,7 +137,7 @@ class Renderer:
                 self._scene.draw_artist(self._axis)
 
 
-def box(inertia) -> np.ndarray:
+def box(inertia: npt.ArrayLike) -> np.ndarray:
     """(3,) half the edges of the homogeneous box, largest edge 2, that turns as the body does."""
     inertia = np.asarray(inertia, float)
     moments = inertia if inertia.ndim == 1 else np.diag(inertia)
@@ -133,7 +145,7 @@ def box(inertia) -> np.ndarray:
     return np.sqrt(squares / np.max(squares))
 
 
-def rotation(quaternion) -> np.ndarray:
+def rotation(quaternion: np.ndarray) -> np.ndarray:
     """(3, 3) matrix from the body's frame to the goal attitude's, of (4,) scalar last."""
     x, y, z, w = quaternion / np.linalg.norm(quaternion)
     rows = (

@@ -3,9 +3,15 @@
 It needs Stable-Baselines3, which no extra of attjax installs.
 """
 
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from stable_baselines3.common.vec_env import VecEnv
+
+Indices = None | int | Iterable[int]
 
 
 def as_vec_env(
@@ -34,7 +40,7 @@ class GymnasiumVecEnv(VecEnv):
     learned as an end). attjax's holds ``is_success``, which Stable-Baselines3 logs.
     """
 
-    def __init__(self, vector_env, reward_scale, time_limit_terminates):
+    def __init__(self, vector_env: VectorEnv, reward_scale: float, time_limit_terminates: bool):
         mode = vector_env.metadata.get("autoreset_mode")
         if mode != AutoresetMode.SAME_STEP:
             raise ValueError(f"autoreset_mode is {mode}; it must be {AutoresetMode.SAME_STEP}")
@@ -47,18 +53,18 @@ class GymnasiumVecEnv(VecEnv):
             vector_env.single_action_space,
         )
 
-    def reset(self):
+    def reset(self) -> np.ndarray:
         """Start all episodes; observations (num_envs, ...). The first environment's seed rules."""
         observations, info = self.vector_env.reset(seed=self._seeds[0])
         self.reset_infos = _unstacked(info, self.num_envs)
         self._reset_seeds()
         return observations
 
-    def step_async(self, actions):
+    def step_async(self, actions: np.ndarray) -> None:
         """Keep the actions for :meth:`step_wait`."""
         self._actions = actions
 
-    def step_wait(self):
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Observations, rewards (num_envs,), ends (num_envs,) and a list of infos."""
         observations, rewards, terminated, truncated, info = self.vector_env.step(self._actions)
         ended = terminated | truncated
@@ -71,15 +77,16 @@ class GymnasiumVecEnv(VecEnv):
             )
         return observations, rewards * self.reward_scale, ended, infos
 
-    def close(self):
+    def close(self) -> None:
         """Close the vector."""
         self.vector_env.close()
 
-    def get_images(self):
+    def get_images(self) -> Sequence[np.ndarray | None]:
         """A picture of each environment, where the vector was made with a render mode."""
-        return list(self.vector_env.render())
+        frames: Any = self.vector_env.render()
+        return list(frames)
 
-    def get_attr(self, attr_name, indices=None):
+    def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
         """The vector's attribute, once for each environment, or each environment's own."""
         vector = self.vector_env.unwrapped
         if not hasattr(vector, attr_name) and hasattr(vector, "get_attr"):
@@ -88,7 +95,7 @@ class GymnasiumVecEnv(VecEnv):
             values = [getattr(vector, attr_name)] * self.num_envs
         return [values[i] for i in self._get_indices(indices)]
 
-    def set_attr(self, attr_name, value, indices=None):
+    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
         """Set the vector's attribute, which all environments share.
 
         Raises:
@@ -98,19 +105,24 @@ class GymnasiumVecEnv(VecEnv):
             raise ValueError(f"indices is {indices!r}; all environments share {attr_name}")
         setattr(self.vector_env.unwrapped, attr_name, value)
 
-    def env_method(self, method_name, *method_args, indices=None, **method_kwargs):
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
+    ) -> list[Any]:
         """The result of each environment's method, as the vector's own ``call`` gives it."""
-        results = self.vector_env.unwrapped.call(method_name, *method_args, **method_kwargs)
+        vector: Any = self.vector_env.unwrapped
+        results = vector.call(method_name, *method_args, **method_kwargs)
         return [results[i] for i in self._get_indices(indices)]
 
-    def env_is_wrapped(self, wrapper_class, indices=None):
+    def env_is_wrapped(
+        self, wrapper_class: type[gymnasium.Wrapper], indices: Indices = None
+    ) -> list[bool]:
         """No environment is."""
         return [False for _ in self._get_indices(indices)]
 
 
 def _unstacked(info, num_envs):
     """A Gymnasium vector's info as a list of one for each environment."""
-    infos = [{} for _ in range(num_envs)]
+    infos: list[dict[str, Any]] = [{} for _ in range(num_envs)]
     for name, values in info.items():
         if (mask := info.get(f"_{name}")) is None:
             continue  # a mask itself

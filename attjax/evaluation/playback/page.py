@@ -3,6 +3,7 @@
 import base64
 import json
 
+import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -71,7 +72,7 @@ def page(
     return resources.fill(f"{TEMPLATES}/page.html", style=style, script=scripts, flights=flights)
 
 
-def _starts(env, params, key) -> EnvState:
+def _starts(env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey) -> EnvState:
     random = evaluation.random_slews(env, params, key, RANDOM_SLEWS)[1]
     return jax.tree.map(lambda *x: jnp.concatenate(x), paper.table_5_slews(), random)
 

@@ -1,6 +1,7 @@
 """One spacecraft on one slew after another, under Gymnasium."""
 
 from collections.abc import Callable
+from typing import Any
 
 import chex
 import gymnasium
@@ -55,6 +56,7 @@ class SlewEnv(Task, gymnasium.Env):
     """
 
     metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012 (Gymnasium's way)
+    action_space: gymnasium.spaces.Discrete
 
     def __init__(
         self,
@@ -69,7 +71,9 @@ class SlewEnv(Task, gymnasium.Env):
         self._own_limit = int(self._params.max_steps_in_episode)
         self.observation_space, self.action_space = self._spaces()
 
-    def reset(self, *, seed=None, options=None):
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """Start an episode. Returns the observation and an empty info.
 
         Args:
@@ -90,7 +94,7 @@ class SlewEnv(Task, gymnasium.Env):
         self._record()
         return np.array(observation), {}
 
-    def step(self, action):
+    def step(self, action: chex.Numeric) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """One agent step.
 
         Args:
@@ -112,7 +116,7 @@ class SlewEnv(Task, gymnasium.Env):
         info = {name: np.asarray(x)[()] for name, x in info.items()}
         return np.array(observation), float(reward), bool(terminated), bool(truncated), info
 
-    def action_masks(self):
+    def action_masks(self) -> np.ndarray:
         """(actions,) bool: the actions after which coasting keeps within the rate limit.
 
         As :func:`attjax.control.assurance.rate_mask` says, at the fraction ``rate_margin`` of the
@@ -123,7 +127,7 @@ class SlewEnv(Task, gymnasium.Env):
         """
         return self._masks()
 
-    def render(self):
+    def render(self) -> np.ndarray | None:
         """A picture of the spacecraft as it is, (360, 640, 3) uint8; None without a render mode."""
         frames = self._frames()
         return None if frames is None else frames[0]

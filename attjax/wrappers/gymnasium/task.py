@@ -7,12 +7,16 @@ import numbers
 import os
 import sys
 from collections.abc import Callable
+from types import FrameType
+from typing import TYPE_CHECKING, Any
 
 import chex
+import gymnasium
 import jax
 import jax.numpy as jnp
 import numpy as np
 from gymnasium import logger, spaces
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from gymnasium.utils.seeding import np_random
 from gymnasium.wrappers import TimeLimit
@@ -21,7 +25,10 @@ from jax._src.xla_bridge import backends_are_initialized
 from attjax.control import assurance
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.reward import REWARDS, Transition
-from attjax.envs.simulator import EnvParams
+from attjax.envs.simulator import EnvParams, EnvState
+
+if TYPE_CHECKING:
+    from attjax.wrappers.rendering import Renderer
 
 ROUNDING = 1e-6
 """By how much, relatively, rounding may carry an observation beyond its bounds."""
@@ -66,11 +73,17 @@ class Options:
 class Task:
     """A mixin: environment, parameters, spaces, time limit, mask and pictures."""
 
+    metadata: dict[str, Any]
+    _spec: EnvSpec | None
+    _state: EnvState | None
+    _renderer: "Renderer | None"
+
     def _set_task(self, options: Options, num_envs: int = 1, limit: int | None = None) -> None:
         check_not_forked()
         env = options.env
         if env is None:
-            reward = REWARDS.get(options.reward, options.reward)
+            reward = options.reward
+            reward = REWARDS[reward] if isinstance(reward, str) else reward
             env = AttitudeEnv(options.frameskip, reward=reward)
         self._env = env
         self._params = env.default_params if options.params is None else options.params
@@ -85,27 +98,29 @@ class Task:
         self.metadata = self.metadata | {"render_fps": float(1 / context.control_period)}
 
     @property
-    def spec(self):
+    def spec(self) -> EnvSpec | None:
         """Gymnasium's, with the time limit that this task has."""
         return self._spec
 
     @spec.setter
-    def spec(self, spec):
+    def spec(self, spec: EnvSpec | None) -> None:
         self._spec = copy.copy(spec)
-        if spec is not None:
+        if self._spec is not None:
             self._spec.max_episode_steps = int(self._params.max_steps_in_episode)
 
     def _set_limit(self, limit):
         """Set the time limit, agent steps; None leaves that of the parameters."""
         if limit is not None and limit != int(self._params.max_steps_in_episode):
             limit = jnp.asarray(limit)
-            self._params = self._params.replace(max_steps_in_episode=limit)
+            self._params = dataclasses.replace(self._params, max_steps_in_episode=limit)
             self._renderer = None
 
     def _spaces(self):
         box = self._env.observation_space(self._params)
-        bounds = (np.asarray(x, np.float32) * np.float32(1 + ROUNDING) for x in (box.low, box.high))
-        return spaces.Box(*bounds), spaces.Discrete(self._env.action_space(self._params).n)
+        low, high = (
+            np.asarray(x, np.float32) * np.float32(1 + ROUNDING) for x in (box.low, box.high)
+        )
+        return spaces.Box(low, high), spaces.Discrete(self._env.action_space(self._params).n)
 
     def _check_reset(self):
         check_not_forked()
@@ -144,10 +159,11 @@ class Task:
             logger.warn("render() draws nothing: there is no render_mode; say 'rgb_array'")
             return None
         self._check_reset()
+        assert self._renderer is not None  # reset() records
         return tuple(self._renderer.frame(i) for i in range(self._num_envs))
 
 
-def outer_time_limit(env) -> int | None:
+def outer_time_limit(env: gymnasium.Env) -> int | None:
     """The least limit of the ``TimeLimit`` wrappers through which ``env.reset`` is being called.
 
     Gymnasium tells no environment which limit ``make(max_episode_steps=...)`` puts around it, but
@@ -155,7 +171,7 @@ def outer_time_limit(env) -> int | None:
     calls that of what it wraps.
     """
     limits = []
-    frame = sys._getframe(1)
+    frame: FrameType | None = sys._getframe(1)
     while frame is not None:
         if frame.f_code.co_name == "reset":
             caller = frame.f_locals.get("self")
@@ -208,11 +224,11 @@ def _allowed(env, params, states, margin):
     return (allowed if one else jax.vmap(allowed))(states.angular_velocity)
 
 
-def starting_key(seed: int):
+def starting_key(seed: int) -> chex.PRNGKey:
     """The key of the first episode after ``reset(seed=seed)`` of one spacecraft."""
     return random_key(np_random(seed)[0])
 
 
-def random_key(generator):
+def random_key(generator: np.random.Generator) -> chex.PRNGKey:
     """A key from a NumPy generator."""
     return jax.random.key(int(generator.integers(2**31)))

@@ -1,7 +1,13 @@
 """The slew task for Gymnasium: many spacecraft in one jitted call."""
 
+from collections.abc import Sequence
+from typing import Any
+
+import chex
 import jax
 import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
@@ -46,6 +52,10 @@ class SlewVectorEnv(Task, VectorEnv):
         "render_modes": ["rgb_array"],
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }
+    single_action_space: spaces.Discrete
+    _key: chex.PRNGKey
+    _observations: chex.Array
+    _ended: np.ndarray
 
     def __init__(
         self,
@@ -53,7 +63,7 @@ class SlewVectorEnv(Task, VectorEnv):
         *,
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
-        **options,
+        **options: Any,
     ):
         self.num_envs = _positive("num_envs", num_envs)
         self.autoreset_mode = _mode(autoreset_mode)
@@ -64,7 +74,12 @@ class SlewVectorEnv(Task, VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
-    def reset(self, *, seed=None, options=None):
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """Start episodes. Returns the observations (num_envs, 11) and an empty info.
 
         Args:
@@ -88,7 +103,9 @@ class SlewVectorEnv(Task, VectorEnv):
         self._record()
         return np.array(self._observations), {}
 
-    def step(self, actions):
+    def step(
+        self, actions: npt.ArrayLike
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """One agent step of all spacecraft.
 
         Args:
@@ -123,21 +140,21 @@ class SlewVectorEnv(Task, VectorEnv):
             return *results, _same_step_info(self._ended, np.array(final_observations), described)
         return *results, _masked(described, ~before)
 
-    def action_masks(self):
+    def action_masks(self) -> np.ndarray:
         """(num_envs, actions) bool: what the rate mask allows, as in :class:`SlewEnv`."""
         return self._masks()
 
-    def render(self):
+    def render(self) -> tuple[np.ndarray, ...] | None:
         """A picture of each spacecraft, a tuple of (360, 640, 3) uint8 arrays."""
         return self._frames()
 
-    def call(self, name, *args, **kwargs):
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """A method's result, or an attribute, for each spacecraft, as Gymnasium's own vectors."""
         value = getattr(self, name)
         value = value(*args, **kwargs) if callable(value) else value
         return tuple(value) if name in EACH_ITS_OWN else (value,) * self.num_envs
 
-    def get_attr(self, name):
+    def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute for each spacecraft, a tuple."""
         return self.call(name)
 
