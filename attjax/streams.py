@@ -11,10 +11,7 @@ import io
 import os
 import sys
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from _typeshed import ReadableBuffer
+from typing import Any
 
 ERRORS = "attjax.plain"
 """The name of our error handler among the codecs'."""
@@ -35,14 +32,14 @@ class Output(io.FileIO):
 
     failure: OSError | None = None
 
-    def write(self, data: "ReadableBuffer", /) -> int:
+    def write(self, data: Any, /) -> int:
         """Write, or drop what is to be written."""
         if self.failure is None:
             try:
                 return super().write(data)
             except OSError as error:
                 self.failure = error
-        return len(memoryview(data))
+        return len(data)
 
 
 @contextlib.contextmanager
