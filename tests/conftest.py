@@ -1,4 +1,10 @@
+# ruff: noqa: E402
+import array_checks
+
+array_checks.install()  # before attjax is imported, here or by what follows
+
 import jax
+import jaxtyping
 import pages
 import pytest
 from commands import STEPS_PER_UPDATE, TINY, run
@@ -18,6 +24,14 @@ def x64():
     """Run a test in float64."""
     with jax.enable_x64(True):
         yield
+
+
+@pytest.fixture
+def as_users_run():
+    """Signatures are not checked, so that what attjax itself says of bad input can be heard."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.fixture

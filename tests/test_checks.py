@@ -90,7 +90,7 @@ def test_parameters(field, value, expected):
     assert expected in message(step, GOAL, 0, params, 5)
 
 
-def test_observations_of_controllers_and_policies():
+def test_observations_of_controllers_and_policies(as_users_run):
     context, short = ENV.context(PARAMS), jnp.zeros(7)
     policy = Policy("multiscale", (8,))
     params = policy.init(jax.random.key(0), jax.random.key(1), jnp.zeros(11), context)

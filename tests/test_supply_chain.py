@@ -15,7 +15,7 @@ SCRIPTS = [ROOT / name for name in ("train.py", "eval.py", "export.py")]
 SOURCES = [*(ROOT / "attjax").rglob("*.py"), *SCRIPTS]
 MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
 MODULES |= {"socket", "urllib", "http", "requests", "ftplib"}
-CORE = {"jax", "jaxlib", "flax", "optax", "chex", "numpy", "orbax-checkpoint", "rich"}
+CORE = {"jax", "jaxlib", "flax", "optax", "chex", "jaxtyping", "numpy", "orbax-checkpoint", "rich"}
 IMPORTED = {name.removesuffix("-checkpoint") for name in CORE}
 FOR_EXTRAS = {
     "canvas.py", "evaluation/plots.py", "export/onnx.py", "export/stablehlo.py",
@@ -42,7 +42,7 @@ def test_sources_unpickle_and_evaluate_nothing(path: Path):
 def test_installed_versions_are_within_the_ranges():
     required = [Requirement(text) for text in importlib.metadata.requires("attjax")]
     core = [r for r in required if r.marker is None or r.marker.evaluate({"extra": ""})]
-    assert len(core) >= 8
+    assert len(core) >= 9
     for requirement in core:
         assert {s.operator for s in requirement.specifier} == {">=", "<"}, requirement
         version = importlib.metadata.version(requirement.name)

@@ -13,7 +13,7 @@ from attjax import errors
 WITHOUT_JAX = (
     "values", "streams", "errors", "destinations", "resources", "spacecraft", "config",
 )  # fmt: skip
-JAX = {"jax", "jaxlib", "flax", "optax", "chex", "orbax"}
+JAX = {"jax", "jaxlib", "jaxtyping", "flax", "optax", "chex", "orbax"}
 OF_SPACECRAFT = {"spacecraft", "simulator", "initial_state", "reward", "attitude"}
 PEERS = {"gymnasium", "gymnax", "rejax", "stable_baselines3", "torch"}
 FOR_PEERS = ("wrappers", *ALIASES)

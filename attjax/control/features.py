@@ -1,10 +1,10 @@
 """What the networks see of an observation: the inputs, and the numbers that they are made of."""
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
-import chex
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float, Shaped
 
 from attjax import checks
 from attjax.envs import observation as observations
@@ -15,6 +15,9 @@ SCALES = tuple(4.0**n for n in range(9))
 
 FEATURE_PERIOD = 0.05
 """Control period to which the multi-scale inputs scale the attitude, s."""
+
+
+Scalar: TypeAlias = Float[Array, ""] | np.floating | float
 
 
 class Multiscale(NamedTuple):
@@ -32,36 +35,40 @@ class Multiscale(NamedTuple):
         (2.0, (6, 54))
     """
 
-    control_period: chex.Array
+    control_period: Scalar
 
     @property
-    def attitude_factor(self) -> chex.Array:
+    def attitude_factor(self) -> Scalar:
         """a: what the vector part of the quaternion is multiplied by."""
         return FEATURE_PERIOD / self.control_period
 
     @property
-    def scales(self) -> np.ndarray:
+    def scales(self) -> Float[np.ndarray, "scales"]:
         """(scales,) factors of each component of x."""
         return np.array(SCALES)
 
     @property
-    def factors(self) -> np.ndarray:
+    def factors(self) -> Float[np.ndarray, "6 columns"]:
         """F: (6, 6 * scales), all of x times the first scale, then times the second, ..."""
         return np.kron(self.scales, np.eye(6))
 
     @property
-    def period(self) -> tuple[chex.Array, ...]:
+    def period(self) -> tuple[Scalar, ...]:
         """The inputs that do not depend on the state: the period in 0.1 s, and its logarithm."""
         return 10 * self.control_period, jnp.log(10 * self.control_period)
 
 
-def state_features(observation: chex.Array, context: Context | None) -> chex.Array:
+def state_features(
+    observation: Shaped[Array | np.ndarray, "size"], context: Context | None
+) -> Shaped[Array | np.ndarray, "size"]:
     """The observation as it is."""
     del context
     return observation
 
 
-def multiscale_features(observation: chex.Array, context: Context) -> chex.Array:
+def multiscale_features(
+    observation: Float[Array | np.ndarray, "11"], context: Context
+) -> Float[Array, "features"]:
     """tanh(k x) of the attitude and of ω for every k of SCALES.
 
     Near the goal the state is 1e-5 of what it is at the start; each scale resolves its own

@@ -1,10 +1,11 @@
 """Functions that differ from NumPy's in their gradients or in how they round."""
 
-import chex
 import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
 
 
-def square_root(x: chex.Array) -> chex.Array:
+def square_root(x: Float[Array | np.ndarray, "*shape"]) -> Float[Array, "*shape"]:
     """√x, element by element, with the gradient 0 where x is 0; that of the plain root is infinite.
 
     A norm made of it has a gradient everywhere: at the goal, and at rest, where ``jax.grad`` of
@@ -19,7 +20,10 @@ def square_root(x: chex.Array) -> chex.Array:
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, x, 1)), 0)
 
 
-def add(total: tuple[chex.Array, chex.Array], x: chex.Array) -> tuple[chex.Array, chex.Array]:
+def add(
+    total: tuple[Float[Array | np.ndarray, "*shape"], Float[Array | np.ndarray, "*shape"]],
+    x: Float[Array | np.ndarray, "*shape"],
+) -> tuple[Float[Array | np.ndarray, "*shape"], Float[Array | np.ndarray, "*shape"]]:
     """Add x to a compensated sum (Kahan's).
 
     Args:

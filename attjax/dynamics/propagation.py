@@ -9,9 +9,11 @@ fastest axis has length 3 or 4. The components have their names in
 import functools
 from typing import NamedTuple
 
-import chex
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.typing import ArrayLike
+from jaxtyping import Array, Float, Real
 
 from attjax import checks
 from attjax.dynamics import quaternion as quaternions
@@ -34,17 +36,17 @@ class AgentStep(NamedTuple):
 class Turn(NamedTuple):
     """Which of the later RK4 steps this is, and how many of them are taken; as floats."""
 
-    index: chex.Array
-    limit: chex.Array
+    number: Float[Array, ""]
+    limit: Float[Array, ""]
 
 
 def rk4_step(
-    quaternion: chex.Array,
-    angular_velocity: chex.Array,
-    torque: chex.Array,
-    inertia: chex.Array,
-    dt: chex.Numeric = INTEGRATION_STEP,
-) -> tuple[chex.Array, chex.Array]:
+    quaternion: Float[Array | np.ndarray, "4"],
+    angular_velocity: Float[Array | np.ndarray, "3"],
+    torque: Float[Array | np.ndarray, "3"],
+    inertia: rigid_body.Inertia,
+    dt: Real[ArrayLike, ""] = INTEGRATION_STEP,
+) -> tuple[Float[Array, "4"], Float[Array, "3"]]:
     """Integrate Eq. 6 and 9 over one fourth-order Runge-Kutta step, without normalisation.
 
     Args:
@@ -76,14 +78,14 @@ def rk4_step(
 
 
 def propagate(
-    quaternion: chex.Array,
-    angular_velocity: chex.Array,
-    torque: chex.Array,
-    inertia: chex.Array,
+    quaternion: Float[Array | np.ndarray, "4"],
+    angular_velocity: Float[Array | np.ndarray, "3"],
+    torque: Float[Array | np.ndarray, "3"],
+    inertia: rigid_body.Inertia,
     frameskip: int,
-    steps_after: chex.Numeric | None = None,
+    steps_after: Real[ArrayLike, ""] | None = None,
     held: bool = False,
-) -> tuple[chex.Array, chex.Array]:
+) -> tuple[Float[Array, "4"], Float[Array, "3"]]:
     """One agent step: an RK4 step with the torque on, then ``frameskip`` torque-free ones.
 
     Eq. 9 is linear in q, so the one normalisation at the end equals the paper's
@@ -108,16 +110,16 @@ def propagate(
     start = RigidState.of(quaternion, angular_velocity)
     limit = None if steps_after is None else jnp.asarray(steps_after, quaternion.dtype)
     change = _change(AgentStep(frameskip, held), start, equations, limit)
-    quaternion, angular_velocity = add(start, change).vectors()
-    return quaternions.normalize(quaternion), angular_velocity
+    quaternion, rate = add(start, change).vectors()
+    return quaternions.normalize(quaternion), rate
 
 
 def rate_after_impulse(
-    angular_velocity: chex.Array,
-    torque: chex.Array,
-    inertia: chex.Array,
-    duration: chex.Numeric = INTEGRATION_STEP,
-) -> chex.Array:
+    angular_velocity: Float[Array | np.ndarray, "3"],
+    torque: Float[Array | np.ndarray, "*batch 3"],
+    inertia: rigid_body.Inertia,
+    duration: Real[ArrayLike, ""] = INTEGRATION_STEP,
+) -> Float[Array | np.ndarray, "*batch 3"]:
     """Angular velocity after a torque that lasts for ``duration``, s, to first order.
 
     Args:
@@ -185,7 +187,7 @@ def _change_with(call, unroll, agent_step, start, equations, limit):
     later_equations = equations if agent_step.held else equations.coasting()
 
     def step(change, index):
-        turn = None if limit is None else Turn(index=index, limit=limit)
+        turn = None if limit is None else Turn(number=index, limit=limit)
         return call(_later_step, turn, start, change, later_equations), None
 
     change = call(_first_step, start, equations)
@@ -202,7 +204,7 @@ def _later_step(turn, start, change, equations):
     later = add(change, _rk4_increment(equations, add(start, change), INTEGRATION_STEP))
     if turn is None:
         return later
-    return jax.tree.map(lambda a, b: jnp.where(turn.index < turn.limit, b, a), change, later)
+    return jax.tree.map(lambda a, b: jnp.where(turn.number < turn.limit, b, a), change, later)
 
 
 def _rk4_increment(equations, state, dt):

@@ -4,19 +4,20 @@ The error quaternion relates the body frame to the desired frame; the goal is ``
 """
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any
 
-import chex
 import jax.numpy as jnp
+import numpy as np
+from jax.typing import ArrayLike
+from jaxtyping import Array, Float, Real
 
 from attjax import checks
 from attjax.dynamics.numerics import square_root
 
-Components: TypeAlias = chex.Array | Sequence[chex.Numeric]
-"""An array, or its entries one by one."""
 
-
-def from_axis_angle(axis: chex.Array, angle: chex.Numeric) -> chex.Array:
+def from_axis_angle(
+    axis: Float[Array | np.ndarray, "3"], angle: Real[ArrayLike, ""]
+) -> Float[Array, "4"]:
     """Quaternion of a rotation (Eq. 8).
 
     Args:
@@ -34,19 +35,21 @@ def from_axis_angle(axis: chex.Array, angle: chex.Numeric) -> chex.Array:
     return jnp.append(axis * jnp.sin(angle / 2), jnp.cos(angle / 2))
 
 
-def normalize(quaternion: chex.Array) -> chex.Array:
+def normalize(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, "4"]:
     """Scale a (4,) quaternion to unit length."""
-    return quaternion / jnp.sqrt(jnp.sum(quaternion**2))
+    return jnp.divide(quaternion, jnp.sqrt(jnp.sum(quaternion**2)))
 
 
 def derivative(
-    quaternion: Components, angular_velocity: Components
-) -> tuple[chex.Array, chex.Array, chex.Array, chex.Array]:
+    quaternion: Float[Array | np.ndarray, "4 *batch"] | Sequence[Any],
+    angular_velocity: Float[Array | np.ndarray, "3 *batch"] | Sequence[Any],
+) -> tuple[Any, Any, Any, Any]:
     """Kinematics, q̇ = ½ Ω(ω) q (Eq. 9 and 10), by components.
 
     Args:
-        quaternion: four components, scalar last, as an array or a tuple.
-        angular_velocity: three body-frame components, rad/s, as an array or a tuple.
+        quaternion: four components, scalar last, as an array or one by one: numbers, arrays over
+            a batch, or whatever else can be added and multiplied.
+        angular_velocity: three body-frame components, rad/s, likewise.
 
     Returns:
         Tuple of the four components of q̇, 1/s.
@@ -65,7 +68,7 @@ def derivative(
     )
 
 
-def rotation_vector(quaternion: chex.Array) -> chex.Array:
+def rotation_vector(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, "3"]:
     """Shortest rotation as axis times angle, (3,), rad, of a (4,) quaternion.
 
     Example:
@@ -81,7 +84,7 @@ def rotation_vector(quaternion: chex.Array) -> chex.Array:
     return jnp.where(quaternion[3] < 0, -scale, scale) * quaternion[:3]
 
 
-def error_angle(quaternion: chex.Array) -> chex.Array:
+def error_angle(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, ""]:
     """Rotation angle φ ∈ [0, 2π], rad, of a (4,) quaternion of any length.
 
     φ = 2 atan2(‖q_v‖, q_s). The arc cosine of q_s would be blind below 0.04° in float32,

@@ -1,33 +1,43 @@
 """What a spacecraft's inertia alone says of its motion."""
 
-import chex
+from typing import TypeAlias
+
 import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
 
 from attjax import checks
 from attjax.dynamics.numerics import square_root
 
+Inertia: TypeAlias = Float[Array | np.ndarray, "3"] | Float[Array | np.ndarray, "3 3"]
+"""Principal moments, or a symmetric tensor in the body frame, kg m²."""
 
-def inverse(inertia: chex.Array) -> chex.Array:
+
+def inverse(inertia: Float[Array | np.ndarray, "3 3"]) -> Float[Array, "3 3"]:
     """Inverse of a symmetric 3x3 matrix, by the cross products of its rows."""
     a, b, c = inertia
     adjugate = jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
     return adjugate / jnp.sum(a * adjugate[0])
 
 
-def angular_momentum(inertia: chex.Array, angular_velocity: chex.Array) -> chex.Array:
+def angular_momentum(
+    inertia: Inertia, angular_velocity: Float[Array | np.ndarray, "*batch 3"]
+) -> Float[Array | np.ndarray, "*batch 3"]:
     """I ω, N m s, for an inertia (3,) or (3, 3) and (..., 3) angular velocities."""
     if inertia.ndim == 1:
         return inertia * angular_velocity
     return jnp.matmul(angular_velocity, inertia, precision="highest")
 
 
-def principal_moments(inertia: chex.Array) -> chex.Array:
+def principal_moments(inertia: Inertia) -> Float[Array, "3"]:
     """(3,) principal moments, kg m², of an inertia (3,) or (3, 3)."""
-    inertia = checks.inertia(inertia)
-    return inertia if inertia.ndim == 1 else jnp.linalg.eigvalsh(inertia)
+    checked = checks.inertia(inertia)
+    return checked if checked.ndim == 1 else jnp.linalg.eigvalsh(checked)
 
 
-def peak_rate(angular_velocity: chex.Array, inertia: chex.Array) -> chex.Array:
+def peak_rate(
+    angular_velocity: Float[Array | np.ndarray, "*batch 3"], inertia: Inertia
+) -> Float[Array, "*batch"]:
     """Largest ‖ω‖ that the spacecraft comes to while it coasts on without torque.
 
     Coasting conserves 2T = ω·Iω and H = ‖Iω‖. In the principal axes, each
@@ -56,7 +66,7 @@ MOST_TURNING = 0.5**0.5
 """Of any body, ‖I⁻¹(ω × Iω)‖ ≤ √½ ‖ω‖² in the norm of :func:`peak_rate_form`."""
 
 
-def peak_rate_form(inertia: chex.Array) -> chex.Array:
+def peak_rate_form(inertia: Inertia) -> Float[Array, "3 3"]:
     """(3, 3) matrix A, dimensionless, of an inertia (3,) or (3, 3): peak rate² = ω·Aω.
 
     In the principal axes it is 1 for the least and the largest moment, and for the other, a =

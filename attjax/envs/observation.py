@@ -1,7 +1,8 @@
 """The paper's state vector (Eq. 11)."""
 
-import chex
 import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
 
 from attjax import checks
 from attjax.dynamics import quaternion as quaternions
@@ -11,7 +12,9 @@ QUATERNION = slice(0, 4)
 ANGULAR_VELOCITY = slice(8, 11)
 
 
-def observe(quaternion: chex.Array, angular_velocity: chex.Array) -> chex.Array:
+def observe(
+    quaternion: Float[Array | np.ndarray, "4"], angular_velocity: Float[Array | np.ndarray, "3"]
+) -> Float[Array, "11"]:
     """Eq. 11: error quaternion, its rate and the angular velocity.
 
     Args:

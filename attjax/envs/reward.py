@@ -7,8 +7,10 @@ in ``train.py --reward module:function``.
 from collections.abc import Callable
 from typing import NamedTuple
 
-import chex
 import jax.numpy as jnp
+import numpy as np
+from jax.typing import ArrayLike
+from jaxtyping import Array, Bool, Float
 
 from attjax.dynamics import quaternion as quaternions
 
@@ -32,17 +34,19 @@ class Transition(NamedTuple):
         impulse: (3,) what the action gives, body frame, N m s: its torque for as long as it acts.
     """
 
-    quaternion: chex.Array
-    next_quaternion: chex.Array
-    next_angular_velocity: chex.Array
-    terminated: chex.Array
-    truncated: chex.Array
-    goal_angle: chex.Array
-    control_period: chex.Array
-    impulse: chex.Array
+    quaternion: Float[Array | np.ndarray, "4"]
+    next_quaternion: Float[Array | np.ndarray, "4"]
+    next_angular_velocity: Float[Array | np.ndarray, "3"]
+    terminated: Bool[ArrayLike, ""]
+    truncated: Bool[ArrayLike, ""]
+    goal_angle: Float[ArrayLike, ""]
+    control_period: Float[ArrayLike, ""]
+    impulse: Float[Array | np.ndarray, "3"]
 
 
-def scalar_part_increased(before: chex.Array, after: chex.Array) -> chex.Array:
+def scalar_part_increased(
+    before: Float[Array | np.ndarray, "4"], after: Float[Array | np.ndarray, "4"]
+) -> Bool[Array, ""]:
     """Whether q_s rose from one (4,) quaternion to the next (condition of Eq. 12).
 
     Within 0.04° of the goal float32 q_s no longer changes, so where both q_s > 0.5 (or
@@ -58,7 +62,7 @@ def scalar_part_increased(before: chex.Array, after: chex.Array) -> chex.Array:
     )
 
 
-def paper_reward(transition: Transition) -> chex.Array:
+def paper_reward(transition: Transition) -> Float[Array, ""]:
     """Eq. 12 and 13; the last step's reward is replaced by the terminal reward.
 
     The terminal reward is −50 beyond the rate limit; at the time limit it is +50 within the
@@ -80,7 +84,7 @@ def paper_reward(transition: Transition) -> chex.Array:
     return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
 
 
-def logarithmic_reward(transition: Transition) -> chex.Array:
+def logarithmic_reward(transition: Transition) -> Float[Array, ""]:
     """−log10(φ + 1e-6), φ in rad, for each 25 ms: every decade of pointing is worth the same.
 
     The time limit earns the ordinary reward, to be bootstrapped by the learner; exceeding
@@ -98,7 +102,7 @@ def logarithmic_reward(transition: Transition) -> chex.Array:
     return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
 
 
-REWARDS: dict[str, Callable[[Transition], chex.Array]] = {
+REWARDS: dict[str, Callable[[Transition], Float[Array, ""]]] = {
     "paper": paper_reward,
     "logarithmic": logarithmic_reward,
 }

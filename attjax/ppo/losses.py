@@ -5,17 +5,20 @@ from collections.abc import Callable
 import chex
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.typing import ArrayLike
+from jaxtyping import Array, Bool, Float, Integer, Real
 
 
 def generalized_advantages(
-    rewards: chex.Array,
-    values: chex.Array,
-    next_values: chex.Array,
-    terminated: chex.Array,
-    done: chex.Array,
-    discount: chex.Numeric,
+    rewards: Float[Array | np.ndarray, "T *batch"],
+    values: Float[Array | np.ndarray, "T *batch"],
+    next_values: Float[Array | np.ndarray, "T *batch"],
+    terminated: Bool[Array | np.ndarray, "T *batch"],
+    done: Bool[Array | np.ndarray, "T *batch"],
+    discount: Real[ArrayLike, "*#batch"],
     gae_lambda: float,
-) -> chex.Array:
+) -> Float[Array, "T *batch"]:
     """Generalised advantage estimates, right at terminations and at truncations.
 
     δ_t = r_t + γ (1 − terminated_t) V(s'_t) − V(s_t),
@@ -52,11 +55,11 @@ def generalized_advantages(
 
 
 def clipped_policy_loss(
-    log_probability: chex.Array,
-    old_log_probability: chex.Array,
-    advantage: chex.Array,
+    log_probability: Float[Array | np.ndarray, "batch"],
+    old_log_probability: Float[Array | np.ndarray, "batch"],
+    advantage: Float[Array | np.ndarray, "batch"],
     clip: float,
-) -> tuple[chex.Array, dict[str, chex.Array]]:
+) -> tuple[Float[Array, ""], dict[str, Float[Array, ""]]]:
     """Eq. 4 with the sign of a loss, averaged over (batch,) arrays.
 
     Returns:
@@ -72,7 +75,10 @@ def clipped_policy_loss(
     return -jnp.mean(objective), diagnostics
 
 
-def pick(log_probabilities: chex.Array, action: chex.Array) -> chex.Array:
+def pick(
+    log_probabilities: Float[Array | np.ndarray, "actions samples"],
+    action: Integer[Array | np.ndarray, "samples"],
+) -> Float[Array, "samples"]:
     """(samples,) log probability of each taken action, from those of all (actions, samples).
 
     A masked sum: gathers and their gradients, scatters, do not vectorise.
@@ -81,12 +87,16 @@ def pick(log_probabilities: chex.Array, action: chex.Array) -> chex.Array:
     return jnp.sum(jnp.where(is_taken, log_probabilities, 0.0), axis=0)
 
 
-def entropy(log_probabilities: chex.Array) -> chex.Array:
-    """(samples,) entropy, nats, of categorical distributions (actions, samples)."""
+def entropy(
+    log_probabilities: Float[Array | np.ndarray, "actions *samples"],
+) -> Float[Array, "*samples"]:
+    """(samples,) entropy, nats, of categorical distributions (actions, samples); () of one."""
     return -jnp.sum(jnp.exp(log_probabilities) * log_probabilities, axis=0)
 
 
-def standardize(x: chex.Array, mean: Callable[[chex.Array], chex.Array] = jnp.mean) -> chex.Array:
+def standardize(
+    x: Float[Array | np.ndarray, "*shape"], mean: Callable[[Array | np.ndarray], Array] = jnp.mean
+) -> Float[Array, "*shape"]:
     """Shift and scale to mean 0 and standard deviation 1, as ``mean`` averages."""
     centred = x - mean(x)
-    return centred / (jnp.sqrt(mean(centred**2)) + 1e-8)
+    return jnp.divide(centred, jnp.sqrt(mean(centred**2)) + 1e-8)

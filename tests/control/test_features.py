@@ -45,6 +45,9 @@ def test_multiscale_features_written_out(x64, period):
     expected += [q[3], period / 0.1, np.log(period / 0.1)]
     observed = jnp.concatenate([q, np.full(4, 7.0), w])  # q̇ is not looked at
     np.testing.assert_allclose(features.multiscale_features(observed, context), expected)
+
+
+def test_an_observation_of_another_size_is_refused(as_users_run):
     wrong = r"observation has shape \(10,\); it must be \(11,\)"
     with pytest.raises(ValueError, match=wrong):
-        features.multiscale_features(observed[:10], context)
+        features.multiscale_features(observe([0, 0, 0])[:10], CONTEXT)

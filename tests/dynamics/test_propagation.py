@@ -175,7 +175,7 @@ def test_float32_stays_close_to_float64(frameskip):
     assert np.median(w_error) <= 3e-7 and w_error.max() <= 2e-6
 
 
-def test_wrong_shapes_and_mixed_types_are_refused():
+def test_wrong_shapes_and_mixed_types_are_refused(as_users_run):
     q, w, torque = jnp.array([0.0, 0, 0, 1]), jnp.zeros(3), jnp.zeros(3)
     inertia = jnp.array(LM50)
     with pytest.raises(ValueError, match=r"quaternion has shape \(3,\); it must be \(4,\)"):
