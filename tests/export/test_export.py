@@ -147,25 +147,25 @@ def test_exports_are_the_same_each_time():
     assert export_c.test_files(precise(5), seed=1) != export_c.test_files(precise(5), seed=0)
 
 
+def assert_decided_as_jax(states, action, logits):
+    assert exported.differing(states, action)[0] == 0
+    clear = states.clear
+    np.testing.assert_allclose(logits[clear], states.logits[clear], rtol=1e-4, atol=2e-3)
+
+
 def test_onnx_decides_as_jax():
     export_onnx = pytest.importorskip("attjax.export.onnx", exc_type=ImportError)
     pytest.importorskip("onnxruntime")
     for flight, states in cases():
         model = export_onnx.files(flight)[export_onnx.FILES[0]]
-        action, logits = exported.onnx_outputs(model, states)
-        assert exported.differing(states, action)[0] == 0
-        clear = states.clear
-        np.testing.assert_allclose(logits[clear], states.logits[clear], rtol=1e-4, atol=2e-3)
+        assert_decided_as_jax(states, *exported.onnx_outputs(model, states))
 
 
 def test_stablehlo_decides_as_jax():
     export_stablehlo = pytest.importorskip("attjax.export.stablehlo", exc_type=ImportError)
     for flight, states in cases():
         program = export_stablehlo.files(flight)[export_stablehlo.FILES[0]]
-        action, logits = exported.stablehlo_outputs(program, states)
-        assert exported.differing(states, action)[0] == 0
-        clear = states.clear
-        np.testing.assert_allclose(logits[clear], states.logits[clear], rtol=1e-4, atol=2e-3)
+        assert_decided_as_jax(states, *exported.stablehlo_outputs(program, states))
 
 
 def test_export_writes_only_its_own_files(tmp_path, capsys):

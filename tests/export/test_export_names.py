@@ -139,7 +139,7 @@ def test_the_inertia_is_told_to_its_last_digit():
     assert "0.9999999 times the rate limit" in header["attjax_policy.c"]
 
 
-@pytest.mark.skipif(exported.compiler() is None, reason="there is no C compiler")
+@exported.needs_compiler
 @pytest.mark.parametrize("flag", ["-ffast-math", "-Ofast", "-ffinite-math-only"])
 def test_a_compiler_that_ignores_nan_is_refused(tmp_path, flag):
     exported.write(tmp_path, export_c.policy_files(exported.untrained("state", (16,), 0.0)))

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from commands import ROOT, eval_script, export_script
+from exported import needs_compiler
 
 from attjax import AttitudeEnv
 from attjax.export import c as export_c
@@ -21,7 +22,6 @@ from attjax.export.flight_policy import FlightPolicy
 from attjax.spacecraft import Spacecraft
 
 PRECISE = ROOT / "pretrained" / "precise"
-needs_compiler = pytest.mark.skipif(exported.compiler() is None, reason="there is no C compiler")
 
 
 def export(checkpoint, out, *flags, format="c"):
