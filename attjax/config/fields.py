@@ -38,7 +38,8 @@ def setting(help: str, *, unit: str = "", symbol: str = "", group: str = "", **l
         group: of ``GROUPS``.
         limits: ``choices``, or ``low``, ``high`` (inclusive), ``above`` and ``below``
             (exclusive), of each element where the field is a tuple, and ``most`` elements;
-            ``or_function``: a user's function will do, as ``module:function``.
+            ``or_function``: a user's function will do, as ``module:function``;
+            ``before``: the value of runs from before there was the setting.
     """
     return dataclasses.field(
         metadata={"help": help, "unit": unit, "symbol": symbol, "group": group, **limits}

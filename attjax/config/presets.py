@@ -13,7 +13,9 @@ PAPER = Settings(
         near_goal_steps=32,
         stagger_episodes=False,
     ),
-    network=Network(features="state", hidden_sizes=(400, 300), rate_margin=0.0),
+    network=Network(
+        features="state", hidden_sizes=(400, 300), initial_weights="orthogonal", rate_margin=0.0
+    ),
     ppo=PPO(
         total_steps=4340 * 30 * 500,
         num_envs=30,
@@ -21,6 +23,7 @@ PAPER = Settings(
         rollout_length=500,
         passes=10,
         minibatch_size=128,
+        most_minibatches=0,
         discount=0.99,
         discount_period=0.0,
         gae_lambda=1.0,
@@ -61,7 +64,9 @@ PRECISE = Settings(
         near_goal_steps=32,
         stagger_episodes=True,
     ),
-    network=Network(features="multiscale", hidden_sizes=(64, 64), rate_margin=0.99),
+    network=Network(
+        features="multiscale", hidden_sizes=(64, 64), initial_weights="orthogonal", rate_margin=0.99
+    ),
     ppo=PPO(
         total_steps=40_000_000,
         num_envs=2048,
@@ -69,6 +74,7 @@ PRECISE = Settings(
         rollout_length=64,
         passes=4,
         minibatch_size=1024,
+        most_minibatches=0,
         discount=0.995,
         discount_period=0.025,
         gae_lambda=0.98,

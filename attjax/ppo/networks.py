@@ -39,18 +39,28 @@ class Dense(nn.Module):
 
     outputs: int
     scale: float
+    initial_weights: str
 
     @nn.compact
     def __call__(self, x, axis):
         """Kernelᵀ x + bias, (outputs, samples), summed over the ``axis`` of x that holds inputs."""
-        dtype = jnp.zeros(()).dtype
-        initial = nn.initializers.orthogonal(self.scale)
-        kernel = self.param("kernel", initial, (x.shape[axis], self.outputs), dtype)
-        bias = self.param("bias", nn.initializers.zeros, (self.outputs,), dtype)
+        dtype, inputs = jnp.zeros(()).dtype, x.shape[axis]
+        initial_kernel, initial_bias = self._initial(inputs)
+        kernel = self.param("kernel", initial_kernel, (inputs, self.outputs), dtype)
+        bias = self.param("bias", initial_bias, (self.outputs,), dtype)
         # Without the barrier, the transposition is moved past the product and its gradients.
         rows = jax.lax.optimization_barrier(kernel.T)
         product = jax.lax.dot_general(rows, x, (((1,), (axis,)), ((), ())), precision="highest")
         return product + bias[:, None]
+
+    def _initial(self, inputs):
+        if self.initial_weights == "orthogonal":
+            return nn.initializers.orthogonal(self.scale), nn.initializers.zeros
+
+        def uniform(key, shape, dtype):
+            return jax.random.uniform(key, shape, dtype, -1.0, 1.0) / inputs**0.5
+
+        return uniform, uniform
 
 
 class MLP(nn.Module):
@@ -59,14 +69,15 @@ class MLP(nn.Module):
     hidden_sizes: tuple[int, ...]
     outputs: int
     output_scale: float
+    initial_weights: str = "orthogonal"
 
     @nn.compact
     def __call__(self, samples):
         """Map (samples, inputs) to (outputs, samples)."""
         x, axis = samples, 1
         for size in self.hidden_sizes:
-            x, axis = nn.relu(Dense(size, 2**0.5)(x, axis)), 0
-        return Dense(self.outputs, self.output_scale)(x, axis)
+            x, axis = nn.relu(Dense(size, 2**0.5, self.initial_weights)(x, axis)), 0
+        return Dense(self.outputs, self.output_scale, self.initial_weights)(x, axis)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,22 +92,24 @@ class Policy:
         rate_margin: the fraction of the rate limit that :func:`attjax.control.assurance.rate_mask`
         keeps;
             0: no mask.
+        initial_weights: "orthogonal", or "uniform" up to 1/√inputs with biases, as PyTorch's.
     """
 
     features: str | Callable = "state"
     hidden_sizes: tuple[int, ...] = (400, 300)
     num_actions: int = 19
     rate_margin: float = 0.0
+    initial_weights: str = "orthogonal"
 
     @property
     def policy_network(self) -> MLP:
         """From features to logits."""
-        return MLP(self.hidden_sizes, self.num_actions, 0.01)
+        return MLP(self.hidden_sizes, self.num_actions, 0.01, self.initial_weights)
 
     @property
     def value_network(self) -> MLP:
         """From features to V(s)."""
-        return MLP(self.hidden_sizes, 1, 1.0)
+        return MLP(self.hidden_sizes, 1, 1.0, self.initial_weights)
 
     def init(
         self,

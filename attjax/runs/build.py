@@ -40,8 +40,13 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
         features = user_functions.resolve(name)
         call = functools.partial(jax.eval_shape, features, *_first_sight(craft))
         user_functions.check(f"features {name}", call, rank=1)
+    network = settings.network
     return Policy(
-        features, settings.network.hidden_sizes, craft.num_actions, settings.network.rate_margin
+        features,
+        network.hidden_sizes,
+        craft.num_actions,
+        network.rate_margin,
+        network.initial_weights,
     )
 
 

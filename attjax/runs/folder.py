@@ -19,6 +19,7 @@ from types import ModuleType
 from attjax import spacecraft
 from attjax.config import settings
 from attjax.config.run import Config
+from attjax.config.settings import FIELDS
 from attjax.errors import UserError, warning_line
 from attjax.runs import belongings
 
@@ -28,7 +29,7 @@ try:
 except ImportError:  # Windows, where runs are not kept apart
     fcntl = None
 
-FORMAT = 6
+FORMAT = 7
 CONFIG, METRICS = belongings.CONFIG, belongings.METRICS
 LOST = "lost+found"
 
@@ -191,13 +192,17 @@ def read_config(folder: Path) -> Config:
         raise FolderError(f"{path} cannot be read: {error!r}") from None
 
 
-def _by_subject(content):
-    """Format 5 had the settings in one table."""
-    by_subject = dataclasses.asdict(settings.from_flat(content["settings"]))
-    return content | {"format": 6, "settings": by_subject}
+def _with_later_settings(content):
+    """Format 6 had fewer settings, and format 5 had them in one table."""
+    given = content["settings"]
+    if content["format"] == 6:
+        given = {name: x for subject in given.values() for name, x in subject.items()}
+    later = {name: f.metadata["before"] for name, f in FIELDS.items() if "before" in f.metadata}
+    by_subject = dataclasses.asdict(settings.from_flat(later | given))
+    return content | {"format": 7, "settings": by_subject}
 
 
-UPGRADES = {5: _by_subject}
+UPGRADES = {5: _with_later_settings, 6: _with_later_settings}
 """What makes the content of an earlier format one of the present format."""
 
 

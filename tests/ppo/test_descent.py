@@ -172,6 +172,17 @@ def test_samples_beyond_whole_minibatches_sit_a_pass_out(monkeypatch, num_device
     assert times.sum() == 4 * 96 and times.max() <= 4 and len(set(times)) > 1
 
 
+@pytest.mark.parametrize("num_devices", [1, 2])
+@pytest.mark.parametrize("most, steps", [(0, 4), (3, 3), (9, 4)])
+def test_a_pass_has_no_more_minibatches_than_are_asked_for(monkeypatch, num_devices, most, steps):
+    setup = small_setup(num_devices, passes=2, most_minibatches=most)
+    taken, _ = minibatches(monkeypatch, setup, 128)
+    assert len(taken) == num_devices * 2 * steps
+    times = np.bincount(np.concatenate([x for _, x, _ in taken]), minlength=128)
+    assert times.max() <= 2 and times.sum() == 2 * steps * 32
+    assert setup.settings.ppo.minibatches == steps
+
+
 @pytest.mark.parametrize("num_envs, minibatch_size, block", [(8, 32, 8), (12, 48, 4), (16, 64, 8)])
 def test_neighbours_stay_together(monkeypatch, num_envs, minibatch_size, block):
     """Up to eight spacecraft, as many as divide both their number and the minibatch."""

@@ -42,6 +42,19 @@ def test_layers_begin_orthogonal_and_without_bias(x64):
         assert len(layers) == 3
 
 
+def test_uniform_layers_begin_as_those_of_pytorch(x64):
+    """Kernel and bias uniform within 1/√inputs, whatever the layer."""
+    params = parameters(Policy(hidden_sizes=(64, 300), initial_weights="uniform"))
+    for network in params.values():
+        for layer in network["params"].values():
+            bound = len(layer["kernel"]) ** -0.5
+            for x in layer.values():
+                assert np.abs(x).max() <= bound
+                if x.size > 100:
+                    assert np.std(x) == pytest.approx(bound / 3**0.5, rel=0.1)
+                    assert abs(np.mean(x)) < 5 * bound / 3**0.5 / x.size**0.5
+
+
 def test_the_papers_policy_sees_the_observation_and_masks_nothing():
     observed = observe([0.6, 0.5, -0.4], (0.1, -0.7, 0.5, 0.5))
     inputs = Policy().encode(observed, CONTEXT)

@@ -46,8 +46,25 @@ def as_format_5(folder):
     """Rewrite a run's config.json as versions did that had the settings in one table."""
     content = json.loads((folder / "config.json").read_text())
     settings = {k: x for subject in content["settings"].values() for k, x in subject.items()}
+    for name in ("initial_weights", "most_minibatches"):
+        del settings[name]
     content |= {"format": 5, "settings": settings}
     (folder / "config.json").write_text(json.dumps(content))
+
+
+def test_a_run_of_format_6_is_read_as_it_was_meant(tmp_path):
+    """It had no word for what was settled then."""
+    run_folder.create(tmp_path, CONFIG, overwrite=False)
+    path = tmp_path / "config.json"
+    content = json.loads(path.read_text())
+    for subject in content["settings"].values():
+        for name in ("initial_weights", "most_minibatches"):
+            subject.pop(name, None)
+    path.write_text(json.dumps(content | {"format": 6}))
+    assert run_folder.read_config(tmp_path) == CONFIG
+    path.write_text(json.dumps(content))
+    with pytest.raises(FolderError, match="missing: initial_weights, most_minibatches"):
+        run_folder.read_config(tmp_path)
 
 
 def test_a_run_of_format_5_is_read_as_it_was_meant(tmp_path):
@@ -55,7 +72,7 @@ def test_a_run_of_format_5_is_read_as_it_was_meant(tmp_path):
     as_format_5(tmp_path)
     assert run_folder.read_config(tmp_path) == CONFIG
     run_folder.write_config(tmp_path, CONFIG)
-    assert json.loads((tmp_path / "config.json").read_text())["format"] == 6
+    assert json.loads((tmp_path / "config.json").read_text())["format"] == 7
     assert run_folder.read_config(tmp_path) == CONFIG
 
 
