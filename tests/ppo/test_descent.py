@@ -1,6 +1,7 @@
 """The gradient steps of an update, against NumPy and the formulas written out anew."""
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -74,9 +75,7 @@ def optimized(setup, samples, update=0):
     specs = (train_state.LEARNER_SPECS, sharding.SPLIT)
     run = sharding.on_devices(
         setup.num_devices,
-        lambda before, samples: descent.optimize(
-            setup.policy, setup.settings.ppo, before, samples, setup.num_devices
-        ),
+        functools.partial(descent.optimize, setup),
         specs,
         (train_state.LEARNER_SPECS, PartitionSpec()),
     )

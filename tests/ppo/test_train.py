@@ -200,9 +200,7 @@ def on_samples(setup, env_params, state, steps):
 
     def on_device(state, steps):
         samples = ppo.with_advantages(setup, env_params, state, steps)
-        return descent.optimize(
-            setup.policy, setup.settings.ppo, state, samples, setup.num_devices
-        )[0].optimizer
+        return descent.optimize(setup, state, samples)[0].optimizer
 
     split = PartitionSpec(None, sharding.AXIS)
     specs = (train_state.LEARNER_SPECS, split)
