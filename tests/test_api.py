@@ -94,7 +94,10 @@ def test_settings_and_spacecraft_of_ones_own():
 @pytest.mark.parametrize(
     "given, message",
     [
-        ({"preset": "fast"}, "preset is 'fast'; it must be one of precise, paper, paper-fast"),
+        (
+            {"preset": "fast"},
+            "preset is 'fast'; it must be one of precise, paper, paper-gae",
+        ),
         ({"gravity": 1}, "unknown or missing: gravity"),
         ({"num_envs": 0}, "num_envs is 0; it must be an integer at least 1"),
         ({"rate_margin": 1e-9}, "masks every torque"),

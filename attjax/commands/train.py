@@ -30,7 +30,9 @@ def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         usage=USAGE, description=__doc__, epilog=command_line.examples(EXAMPLES)
     )
     groups = {name: parser.add_argument_group(title) for name, title in fields.GROUPS.items()}
-    preset_help = f"the recipe; flags override it (default: {run_config.DEFAULT_PRESET})"
+    remarks = "; ".join(presets.REMARKS.values())
+    default = run_config.DEFAULT_PRESET
+    preset_help = f"the recipe; flags override it; {remarks} (default: {default})"
     groups["run"].add_argument("--preset", choices=presets.PRESETS, help=preset_help)
     craft_help = "TOML file that describes the spacecraft and its task (default: LM50, the paper's)"
     groups["task"].add_argument(

@@ -5,7 +5,7 @@ from pathlib import Path
 import jax
 
 from attjax import errors
-from attjax.config import command_line
+from attjax.config import command_line, presets
 from attjax.config.settings import Settings
 from attjax.ppo import train_state
 from attjax.runs.progress import Progress
@@ -42,6 +42,8 @@ class Terminal(Observer):
             f"({ppo.num_updates:,} updates of {ppo.steps_per_update:,}) on "
             f"{run.setup.num_devices} x {device.device_kind} ({device.platform}), in {self._folder}"
         )
+        if config.preset in presets.REMARKS:
+            print(presets.REMARKS[config.preset])
         if run.update:
             print(f"resumed at {run.agent_steps:,} agent steps")
 

@@ -8,12 +8,12 @@ import pytest
 from commands import ROOT
 
 from attjax.config import presets, settings
-from attjax.config.presets import PAPER, PAPER_FAST, PRECISE, PRESETS
+from attjax.config.presets import PAPER, PAPER_FAST, PAPER_GAE, PRECISE, PRESETS
 
 
 def test_paper_presets_hold_what_the_paper_names():
     """Tables 3 and 4, section 2.5."""
-    for preset in (PAPER, PAPER_FAST):
+    for preset in (PAPER, PAPER_GAE, PAPER_FAST):
         task, network, ppo = preset.task, preset.network, preset.ppo
         assert network.hidden_sizes == (400, 300)
         assert (ppo.discount, ppo.discount_period) == (0.99, 0)
@@ -24,6 +24,7 @@ def test_paper_presets_hold_what_the_paper_names():
     ppo = PAPER.ppo
     assert (ppo.num_envs, ppo.rollout_length, ppo.minibatch_size) == (30, 500, 128)
     assert ppo.num_updates == 4340 and ppo.gae_lambda == 1
+    assert PAPER.replace(gae_lambda=0.95) == PAPER_GAE
 
 
 @pytest.mark.parametrize("preset", PRESETS.values())

@@ -27,6 +27,11 @@ def small_setup(num_devices=1, **overrides):
     return dataclasses.replace(setup, num_devices=num_devices)
 
 
+def split_setup(**overrides):
+    """The same, a device for each network."""
+    return dataclasses.replace(small_setup(2, **overrides), splits_networks=True)
+
+
 def random_samples(count):
     rng = np.random.default_rng(0)
     return descent.Sample(
@@ -117,7 +122,7 @@ class Minibatches:
         device = jax.lax.axis_index(sharding.AXIS)
         jax.debug.callback(self._keep, device, sample.action, sample.advantage, sample.target)
         nothing = sum(jnp.sum(0 * x) for x in jax.tree.leaves(params))
-        return nothing, {"mean": jnp.mean(sample.target)}
+        return nothing, {"value_loss": jnp.mean(sample.target)}
 
     def _keep(self, device, *fields):
         self.taken.append((int(device), *map(np.asarray, fields)))
@@ -152,7 +157,7 @@ def test_every_pass_takes_all_samples_in_an_order_of_its_own(monkeypatch, num_de
     assert len(taken) == num_devices * 3 * 16
     numbers = np.concatenate([x for _, x, _ in taken])
     np.testing.assert_array_equal(np.bincount(numbers), np.full(1024, 3))
-    assert float(metrics["mean"]) == pytest.approx(
+    assert float(metrics["value_loss"]) == pytest.approx(
         np.mean([x.mean() for device, x, _ in taken if device == 0]), rel=1e-6
     )
     # Were two passes, or two devices, in the same order, they would share whole minibatches.
@@ -169,6 +174,19 @@ def test_samples_beyond_whole_minibatches_sit_a_pass_out(monkeypatch, num_device
     assert [len(x) for _, x, _ in taken] == [48 // num_devices] * 8 * num_devices
     times = np.bincount(np.concatenate([x for _, x, _ in taken]), minlength=128)
     assert times.sum() == 4 * 96 and times.max() <= 4 and len(set(times)) > 1
+
+
+def test_a_device_for_each_network_gives_it_all_samples(monkeypatch):
+    """Whole minibatches of its own order, of the spacecraft of both."""
+    setup = split_setup(num_envs=16, rollout_length=64, minibatch_size=64, passes=3)
+    taken, _ = minibatches(monkeypatch, setup, 1024)
+    for device in (0, 1):
+        numbers = [x for of, x, _ in taken if of == device]
+        assert len(numbers) == 3 * 16 and {len(x) for x in numbers} == {64}
+        np.testing.assert_array_equal(np.bincount(np.concatenate(numbers)), np.full(1024, 3))
+        assert sum(len(set(x // 512)) == 2 for x in numbers) > 40
+    orders = [np.concatenate([x for of, x, _ in taken if of == device]) for device in (0, 1)]
+    assert np.mean(orders[0] == orders[1]) < 0.1
 
 
 @pytest.mark.parametrize("num_devices", [1, 2])
@@ -212,10 +230,11 @@ def test_advantages_are_standardized_in_each_minibatch(monkeypatch, num_devices,
         np.testing.assert_allclose(advantages, expected, rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.parametrize("make_setup", [small_setup, split_setup])
 @pytest.mark.parametrize("normalize, max_norm", [(True, 0.05), (False, 0.0)])
-def test_a_gradient_step_is_adams_along_the_loss_written_out(x64, normalize, max_norm):
+def test_a_gradient_step_is_adams_along_the_loss_written_out(x64, make_setup, normalize, max_norm):
     """All samples in one minibatch; Adam's first moment is a tenth of the gradient, clipped."""
-    setup = small_setup(
+    setup = make_setup(
         minibatch_size=128,
         passes=1,
         normalize_advantage=normalize,
