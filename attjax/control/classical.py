@@ -64,7 +64,8 @@ def quaternion_feedback(observation: chex.Array, context: Context) -> chex.Array
     quaternion = observation[observations.QUATERNION]
     sign = jnp.where(quaternion[3] < 0, -1.0, 1.0).astype(quaternion.dtype)
     largest = jnp.max(rigid_body.principal_moments(context.inertia))
-    bandwidth = FEEDBACK_BANDWIDTH * jnp.sqrt(average_torque(context) / (jnp.pi * largest))
+    half_turn = context.integral_of_rate(jnp.pi)
+    bandwidth = FEEDBACK_BANDWIDTH * jnp.sqrt(average_torque(context) / (half_turn * largest))
     vector = context.integral_of_rate(quaternion[:3])
     return nearest_action(-2 * bandwidth * sign * vector, observation, context)
 

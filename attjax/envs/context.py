@@ -32,7 +32,7 @@ class Context:
         """The largest magnitude in the torque table, N m."""
         return jnp.sqrt(jnp.max(jnp.sum(self.torque_table**2, axis=-1)))
 
-    def integral_of_rate(self, angle: chex.Array) -> chex.Array:
+    def integral_of_rate(self, angle: chex.Numeric) -> chex.Numeric:
         """∫ω dt, rad, of a turn by ``angle`` about a fixed axis: by Eq. 9 the angle itself."""
         factor = self.kinematic_factor
         return angle if factor == 0.5 else angle / (2 * factor)
