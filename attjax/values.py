@@ -43,6 +43,26 @@ def check_number(name: str, x: Any, low: float, high: float) -> None:
         raise ValueError(f"{name} is {x}; it must be from {low:g} to {high:g}")
 
 
+def check_share(name: str, x: Any) -> None:
+    """Check a number above 0 and at most 1.
+
+    Raises:
+        ValueError: it is none.
+    """
+    if not (_is_number(x) and 0 < x <= 1):
+        raise ValueError(f"{name} is {shown(x)}; it must be above 0 and at most 1")
+
+
+def check_truth(name: str, x: Any) -> None:
+    """Check a bool.
+
+    Raises:
+        ValueError: it is none.
+    """
+    if not isinstance(x, bool):
+        raise ValueError(f"{name} is {shown(x)}; it must be True or False")
+
+
 def check_numbers(
     name: str,
     values: Any,

@@ -28,9 +28,9 @@ class Change(NamedTuple):
     rate_margin: float = 0.0
 
 
-def other_kinematics(quaternion, angular_velocity):
+def other_kinematics(quaternion, angular_velocity, factor=0.5):
     """Without the ½, and two of its components in each other's place."""
-    first, second, third, last = (2.0 * x for x in KINEMATICS(quaternion, angular_velocity))
+    first, second, third, last = (2.0 * x for x in KINEMATICS(quaternion, angular_velocity, factor))
     return first, third, second, last
 
 

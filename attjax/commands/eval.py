@@ -119,8 +119,12 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file):
     from attjax import evaluation
     from attjax.envs.attitude import AttitudeEnv
     from attjax.evaluation import tables
+    from attjax.runs import build
 
-    env = AttitudeEnv(arguments.frameskip, spacecraft=spacecraft)
+    rules = {}
+    if POLICY in controllers:
+        rules = build.rules(run_folder.read_config(arguments.checkpoint).settings.task)
+    env = AttitudeEnv(arguments.frameskip, spacecraft=spacecraft, **rules)
     params, seed, episodes = env.default_params, arguments.seed or 0, arguments.episodes
     start, results, written = time.monotonic(), [], []
     for name, controller in controllers.items():

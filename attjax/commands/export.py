@@ -102,7 +102,7 @@ def _flight_policy(arguments):
     from attjax.envs.attitude import AttitudeEnv
     from attjax.export import provenance
     from attjax.export.flight_policy import FlightPolicy
-    from attjax.runs import checkpoint
+    from attjax.runs import build, checkpoint
 
     folder = arguments.checkpoint
     config = run_folder.read_config(folder)
@@ -119,7 +119,8 @@ def _flight_policy(arguments):
     if frameskip is None:
         frameskip = fields.frameskip_to_judge(config.settings.task.frameskips)
     with _exporting(folder):
-        env = AttitudeEnv(frameskip, spacecraft=config.spacecraft)
+        rules = build.rules(config.settings.task)
+        env = AttitudeEnv(frameskip, spacecraft=config.spacecraft, **rules)
         return FlightPolicy(policy, params, env, provenance.of_run(config, update, newest))
 
 

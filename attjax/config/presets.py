@@ -12,6 +12,8 @@ PAPER = Settings(
         near_goal_share=0.0,
         near_goal_steps=32,
         stagger_episodes=False,
+        kinematic_factor=0.5,
+        observes_quaternion_rate=True,
     ),
     network=Network(
         features="state", hidden_sizes=(400, 300), initial_weights="orthogonal", rate_margin=0.0
@@ -69,6 +71,8 @@ PRECISE = Settings(
         near_goal_share=0.9,
         near_goal_steps=32,
         stagger_episodes=True,
+        kinematic_factor=0.5,
+        observes_quaternion_rate=True,
     ),
     network=Network(
         features="multiscale", hidden_sizes=(64, 64), initial_weights="orthogonal", rate_margin=0.99

@@ -22,8 +22,9 @@ class Task(Checked):
         most=64,
     )
     reward: str = _task(
-        "Eq. 12-13 with terminal rewards, -log10 of the error angle, or module:function",
-        choices=("paper", "logarithmic"),
+        "Eq. 12-13 with terminal rewards, -log10 of the error angle, Eq. 12-13 as in the authors' "
+        "public code without and with a price on torque, or module:function",
+        choices=("paper", "logarithmic", "authors", "authors-continuous"),
         or_function=True,
     )
     reward_scale: float = _task("factor on the reward the learner sees", above=0)
@@ -44,6 +45,16 @@ class Task(Checked):
     near_goal_steps: int = _task("agent steps of such a short episode", low=1, high=10_500)
     stagger_episodes: bool = _task(
         "start the first episodes at random times, so that they do not end all at once"
+    )
+    kinematic_factor: float = _task(
+        "factor of Eq. 9, 0.5; 1 in the authors' public code, where attitude turns twice as fast",
+        above=0,
+        high=1,
+        before=0.5,
+    )
+    observes_quaternion_rate: bool = _task(
+        "observe Eq. 11's rate of the quaternion; otherwise zeros, as in the authors' public code",
+        before=True,
     )
 
 

@@ -34,7 +34,8 @@ def phase_plane(observation: chex.Array, context: Context) -> chex.Array:
     With the impulses shared among the axes so that all arrive together, the angle |θ| that
     remains can be braked from the rate ω = −θ √(2 η U / Σ|I θ|), where U is the largest
     torque averaged over a control period and η the braking margin. Close to the goal the
-    rate is limited to a share of θ in each period.
+    rate is limited to a share of θ in each period. (θ is what ω must integrate to; by other
+    kinematics than Eq. 9's that is not the angle.)
 
     Args:
         observation: (11,) Eq. 11.
@@ -45,6 +46,7 @@ def phase_plane(observation: chex.Array, context: Context) -> chex.Array:
     """
     observation = checks.real("observation", observation, (observations.SIZE,))
     angle = quaternions.rotation_vector(observation[observations.QUATERNION])
+    angle = context.integral_of_rate(angle)
     momentum = jnp.sum(jnp.abs(rigid_body.angular_momentum(context.inertia, angle)))
     braking = jnp.sqrt(2 * BRAKING_MARGIN * average_torque(context) / jnp.maximum(momentum, 1e-12))
     gain = jnp.minimum(braking, TERMINAL_GAIN / context.control_period)
@@ -62,8 +64,10 @@ def quaternion_feedback(observation: chex.Array, context: Context) -> chex.Array
     quaternion = observation[observations.QUATERNION]
     sign = jnp.where(quaternion[3] < 0, -1.0, 1.0).astype(quaternion.dtype)
     largest = jnp.max(rigid_body.principal_moments(context.inertia))
-    bandwidth = FEEDBACK_BANDWIDTH * jnp.sqrt(average_torque(context) / (jnp.pi * largest))
-    return nearest_action(-2 * bandwidth * sign * quaternion[:3], observation, context)
+    half_turn = context.integral_of_rate(jnp.pi)
+    bandwidth = FEEDBACK_BANDWIDTH * jnp.sqrt(average_torque(context) / (half_turn * largest))
+    vector = context.integral_of_rate(quaternion[:3])
+    return nearest_action(-2 * bandwidth * sign * vector, observation, context)
 
 
 def average_torque(context: Context) -> chex.Array:

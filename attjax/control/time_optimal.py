@@ -15,6 +15,6 @@ def time_optimal_reference(quaternion: chex.Array, context: Context) -> chex.Arr
     U is the largest torque averaged over a control period. An estimate and no bound: turning
     about other axes than the eigenaxis can be about a tenth quicker.
     """
-    angle = quaternions.rotation_vector(quaternion)
+    angle = context.integral_of_rate(quaternions.rotation_vector(quaternion))
     momentum = jnp.abs(rigid_body.angular_momentum(context.inertia, angle))
     return 2 * numerics.square_root(jnp.sum(momentum) / average_torque(context))

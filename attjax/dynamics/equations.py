@@ -6,8 +6,10 @@ spacecraft is one more term in :meth:`EquationsOfMotion.rate`, and what else cha
 more component of the state.
 """
 
+import dataclasses
 import operator
-from typing import NamedTuple, TypeVar
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeVar
 
 import chex
 import jax
@@ -102,27 +104,50 @@ class TensorTerms(NamedTuple):
         return along(self.first), along(self.second), along(self.third)
 
 
+@jax.tree_util.register_static
+@dataclasses.dataclass(frozen=True)
+class Kinematics:
+    """Eq. 9. It is known when it is compiled, and no number of the trees that hold it.
+
+    Attributes:
+        factor: of Ω(ω) q: ½, or 1, as the authors' public code has it.
+    """
+
+    factor: float = 0.5
+
+    def rate(self, quaternion: Sequence[Any], angular_velocity: Sequence[Any]) -> tuple:
+        """The four components of q̇, 1/s, of those of q and of ω, rad/s."""
+        return quaternions.derivative(quaternion, angular_velocity, self.factor)
+
+
 class EquationsOfMotion(NamedTuple):
     """Eq. 6, solved for ω̇, and Eq. 9, with all that stays the same over an RK4 step.
 
     Attributes:
         torque: I⁻¹ M of the commanded torque, rad/s²; None while none is on.
         gyroscopic: the terms of −I⁻¹ (ω × Iω).
+        kinematics: of the attitude.
     """
 
     torque: Vector | None
     gyroscopic: PrincipalTerms | TensorTerms
+    kinematics: Kinematics
 
     @classmethod
-    def of(cls, inertia: chex.Array, torque: chex.Array) -> "EquationsOfMotion":
+    def of(
+        cls, inertia: chex.Array, torque: chex.Array, kinematic_factor: float = 0.5
+    ) -> "EquationsOfMotion":
         """The equations of an inertia (3,) or (3, 3), kg m², under a torque (3,), N m."""
+        kinematics = Kinematics(kinematic_factor)
+        gyroscopic: PrincipalTerms | TensorTerms
         if inertia.ndim == 1:
-            principal = PrincipalTerms.of(inertia)
-            return cls(torque=tuple(torque / inertia), gyroscopic=principal)
-        inverse = rigid_body.inverse(inertia)
-        tensor = TensorTerms.of(inertia, inverse)
-        acceleration = jnp.matmul(inverse, torque, precision="highest")
-        return cls(torque=tuple(acceleration), gyroscopic=tensor)
+            gyroscopic = PrincipalTerms.of(inertia)
+            acceleration = torque / inertia
+        else:
+            inverse = rigid_body.inverse(inertia)
+            gyroscopic = TensorTerms.of(inertia, inverse)
+            acceleration = jnp.matmul(inverse, torque, precision="highest")
+        return cls(torque=tuple(acceleration), gyroscopic=gyroscopic, kinematics=kinematics)
 
     def coasting(self) -> "EquationsOfMotion":
         """The same with the commanded torque off."""
@@ -134,7 +159,7 @@ class EquationsOfMotion(NamedTuple):
         if self.torque is not None:
             acceleration = add(acceleration, self.torque)
         return RigidState(
-            quaternion=quaternions.derivative(state.quaternion, state.angular_velocity),
+            quaternion=self.kinematics.rate(state.quaternion, state.angular_velocity),
             angular_velocity=acceleration,
         )
 

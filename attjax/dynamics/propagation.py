@@ -27,10 +27,15 @@ STEPS_IN_LINE = 20
 
 
 class AgentStep(NamedTuple):
-    """What is known of an agent step when it is compiled: see :func:`propagate`."""
+    """What is known of an agent step when it is compiled.
+
+    Attributes:
+        frameskip: number of RK4 steps after the first.
+        held: whether the torque stays on in these steps.
+    """
 
     frameskip: int
-    held: bool
+    held: bool = False
 
 
 class Turn(NamedTuple):
@@ -46,6 +51,7 @@ def rk4_step(
     torque: Float[Array | np.ndarray, "3"],
     inertia: rigid_body.Inertia,
     dt: Real[ArrayLike, ""] = INTEGRATION_STEP,
+    kinematic_factor: float = 0.5,
 ) -> tuple[Float[Array, "4"], Float[Array, "3"]]:
     """Integrate Eq. 6 and 9 over one fourth-order Runge-Kutta step, without normalisation.
 
@@ -55,6 +61,8 @@ def rk4_step(
         torque: (3,) body-frame external torque, constant over the step, N m.
         inertia: (3,) principal moments or (3, 3) symmetric tensor in the body frame, kg m².
         dt: step length, s.
+        kinematic_factor: what stands in place of Eq. 9's ½, a Python float; 1 in the authors'
+            public code.
 
     Returns:
         The quaternion (4,) and the angular velocity (3,) after the step.
@@ -73,7 +81,8 @@ def rk4_step(
         quaternion, angular_velocity, torque, inertia
     )
     start = RigidState.of(quaternion, angular_velocity)
-    change = _rk4_increment(EquationsOfMotion.of(inertia, torque), start, dt)
+    equations = EquationsOfMotion.of(inertia, torque, kinematic_factor)
+    change = _rk4_increment(equations, start, dt)
     return add(start, change).vectors()
 
 
@@ -103,13 +112,36 @@ def propagate(
         The unit quaternion (4,) and the angular velocity (3,) after (1 + frameskip)/240 s, or
         after (1 + steps_after)/240 s.
     """
+    agent_step = AgentStep(frameskip, held)
+    return take(agent_step, quaternion, angular_velocity, torque, inertia, steps_after)
+
+
+def take(
+    agent_step: AgentStep,
+    quaternion: Float[Array | np.ndarray, "4"],
+    angular_velocity: Float[Array | np.ndarray, "3"],
+    torque: Float[Array | np.ndarray, "3"],
+    inertia: rigid_body.Inertia,
+    steps_after: Real[ArrayLike, ""] | None = None,
+    kinematic_factor: float = 0.5,
+) -> tuple[Float[Array, "4"], Float[Array, "3"]]:
+    """:func:`propagate`, by any kinematics.
+
+    Args:
+        agent_step: the frameskip, and whether the torque is held.
+        quaternion, angular_velocity, torque, inertia, steps_after: as in :func:`propagate`.
+        kinematic_factor: as in :func:`rk4_step`.
+
+    Returns:
+        As :func:`propagate`.
+    """
     quaternion, angular_velocity, torque, inertia = _checked(
         quaternion, angular_velocity, torque, inertia
     )
-    equations = EquationsOfMotion.of(inertia, torque)
+    equations = EquationsOfMotion.of(inertia, torque, kinematic_factor)
     start = RigidState.of(quaternion, angular_velocity)
     limit = None if steps_after is None else jnp.asarray(steps_after, quaternion.dtype)
-    change = _change(AgentStep(frameskip, held), start, equations, limit)
+    change = _change(agent_step, start, equations, limit)
     quaternion, rate = add(start, change).vectors()
     return quaternions.normalize(quaternion), rate
 

@@ -43,6 +43,7 @@ def normalize(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, "4"]:
 def derivative(
     quaternion: Float[Array | np.ndarray, "4 *batch"] | Sequence[Any],
     angular_velocity: Float[Array | np.ndarray, "3 *batch"] | Sequence[Any],
+    factor: float = 0.5,
 ) -> tuple[Any, Any, Any, Any]:
     """Kinematics, q̇ = ½ Ω(ω) q (Eq. 9 and 10), by components.
 
@@ -50,6 +51,7 @@ def derivative(
         quaternion: four components, scalar last, as an array or one by one: numbers, arrays over
             a batch, or whatever else can be added and multiplied.
         angular_velocity: three body-frame components, rad/s, likewise.
+        factor: what stands in place of the ½, a Python float.
 
     Returns:
         Tuple of the four components of q̇, 1/s.
@@ -61,10 +63,10 @@ def derivative(
     q1, q2, q3, qs = quaternion
     w1, w2, w3 = angular_velocity
     return (
-        0.5 * (w3 * q2 - w2 * q3 + w1 * qs),
-        0.5 * (w1 * q3 - w3 * q1 + w2 * qs),
-        0.5 * (w2 * q1 - w1 * q2 + w3 * qs),
-        -0.5 * (w1 * q1 + w2 * q2 + w3 * q3),
+        factor * (w3 * q2 - w2 * q3 + w1 * qs),
+        factor * (w1 * q3 - w3 * q1 + w2 * qs),
+        factor * (w2 * q1 - w1 * q2 + w3 * qs),
+        -factor * (w1 * q1 + w2 * q2 + w3 * q3),
     )
 
 

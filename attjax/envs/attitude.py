@@ -16,7 +16,7 @@ from attjax.envs.context import Context
 from attjax.envs.reward import Transition, paper_reward
 from attjax.envs.simulator import EnvParams, EnvState
 from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
-from attjax.values import integer
+from attjax.values import check_share, check_truth, integer
 
 _OBSERVATION, _STEPS = np.uint32(2**32 - 1), np.uint32(2**32 - 2)
 """What ``fold_in`` derives keys with that share nothing with the one they come from.
@@ -36,9 +36,14 @@ class AttitudeEnv:
         reward: function of a :class:`attjax.envs.reward.Transition`.
         initial_state: function of a key and parameters that draws the start of an episode.
         spacecraft: what flies, and its task; ``default_params`` are its.
+        kinematic_factor: of Ω(ω) q in Eq. 9, ½; 1 in the authors' public code, where attitude
+            turns twice as fast at the same ω.
+        observes_quaternion_rate: whether Eq. 11's q̇ is observed; the authors' public code never
+            works it out, and shows zeros.
 
     Raises:
-        ValueError: frameskip is no integer from 0 on, or an agent step exceeds the episode.
+        ValueError: frameskip is no integer from 0 on, an agent step exceeds the episode, or
+            another value is not as said.
 
     Example:
         >>> env = AttitudeEnv(frameskip=20)
@@ -51,6 +56,8 @@ class AttitudeEnv:
     reward: Callable[[Transition], chex.Array] = paper_reward
     initial_state: Callable[[chex.PRNGKey, EnvParams], EnvState] = initial_state.initial_state
     spacecraft: Spacecraft = LM50
+    kinematic_factor: float = 0.5
+    observes_quaternion_rate: bool = True
 
     def __post_init__(self):
         most = self.spacecraft.most_frameskip
@@ -60,6 +67,8 @@ class AttitudeEnv:
                 f"frameskip is {self.frameskip!r}; it must be an integer from 0 to {most}"
             )
         object.__setattr__(self, "frameskip", frameskip)  # as JAX compiles for each it is told of
+        check_share("kinematic_factor", self.kinematic_factor)
+        check_truth("observes_quaternion_rate", self.observes_quaternion_rate)
 
     name = "AttitudeEnv"
 
@@ -82,7 +91,8 @@ class AttitudeEnv:
         """What a controller may know of this environment."""
         period = self._period(params)
         duration = period if params.torque_held else INTEGRATION_STEP
-        return Context(period, params.inertia, params.torque_table, params.rate_limit, duration)
+        spacecraft = params.inertia, params.torque_table, params.rate_limit
+        return Context(period, *spacecraft, duration, self.kinematic_factor)
 
     def _period(self, params):
         frameskip = self.frameskip if params.frameskip is None else params.frameskip
@@ -151,7 +161,7 @@ class AttitudeEnv:
             ``info["torque"]``, (3,), N m, body frame, is what acted for the context's
             ``torque_duration``.
         """
-        next_state = simulator.step(state, action, params, self.frameskip)
+        next_state = simulator.step(state, action, params, self.frameskip, self.kinematic_factor)
         torque = simulator.applied_torque(action, params)
         rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2))
         terminated = rate > params.rate_limit
@@ -190,7 +200,8 @@ class AttitudeEnv:
             params: its parameters.
         """
         del key, params
-        return observations.observe(state.quaternion, state.angular_velocity)
+        rules = self.kinematic_factor, self.observes_quaternion_rate
+        return observations.observe(state.quaternion, state.angular_velocity, *rules)
 
     def starts_whole(self, state: EnvState) -> chex.Array:
         """Whether the episode that begins with this state is one of the task's: a bool a state.
@@ -209,7 +220,7 @@ class AttitudeEnv:
         kick = context.largest_torque * context.torque_duration / jnp.min(moments)
         rate = (params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))
         one = jnp.ones_like(rate)
-        high = jnp.stack([one] * 4 + [rate / 2] * 4 + [rate] * 3)
+        high = jnp.stack([one] * 4 + [self.kinematic_factor * rate] * 4 + [rate] * 3)
         return spaces.Box(-high, high)
 
     def action_space(self, params: EnvParams | None = None) -> spaces.Discrete:

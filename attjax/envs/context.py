@@ -17,6 +17,7 @@ class Context:
         torque_table: (actions, 3) torque of each action, body frame, N m.
         rate_limit: largest admissible ‖ω‖, rad/s.
         torque_duration: how long a torque acts, from the beginning of a control period, s.
+        kinematic_factor: of the kinematics, ½ by Eq. 9; a Python float.
     """
 
     control_period: chex.Array
@@ -24,8 +25,14 @@ class Context:
     torque_table: chex.Array
     rate_limit: chex.Array
     torque_duration: chex.Numeric = INTEGRATION_STEP
+    kinematic_factor: float = struct.field(pytree_node=False, default=0.5)
 
     @property
     def largest_torque(self) -> chex.Array:
         """The largest magnitude in the torque table, N m."""
         return jnp.sqrt(jnp.max(jnp.sum(self.torque_table**2, axis=-1)))
+
+    def integral_of_rate(self, angle: chex.Numeric) -> chex.Numeric:
+        """∫ω dt, rad, of a turn by ``angle`` about a fixed axis: by Eq. 9 the angle itself."""
+        factor = self.kinematic_factor
+        return angle if factor == 0.5 else angle / (2 * factor)

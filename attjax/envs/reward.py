@@ -13,9 +13,18 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Bool, Float
 
 from attjax.dynamics import quaternion as quaternions
+from attjax.dynamics.numerics import square_root
+from attjax.spacecraft import INTEGRATION_STEP
 
 TERMINAL_BONUS = 50.0
 OVERSPEED_PENALTY = -50.0
+AUTHORS_OVERSPEED_PENALTY = -25.0
+TORQUE_PRICE = 0.5
+"""Of the largest pulse, in the reward of the authors' continuous environment."""
+
+LARGEST_PULSE = 0.5 * INTEGRATION_STEP
+"""Of Table 1, N m s: 0.5 N m for one RK4 step."""
+
 REFERENCE_PERIOD = 0.025
 """Control period to which :func:`logarithmic_reward` is normalised, s (40 Hz)."""
 
@@ -102,8 +111,42 @@ def logarithmic_reward(transition: Transition) -> Float[Array, ""]:
     return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
 
 
+def authors_reward(transition: Transition) -> Float[Array, ""]:
+    """Eq. 12 and 13 as the authors' public code has them: −25 beyond the rate limit.
+
+    Example:
+        >>> goal = jnp.array([0.0, 0.0, 0.0, 1.0])
+        >>> rest = jnp.zeros(3)
+        >>> too_fast = Transition(goal, goal, rest, True, False, 0.00436, 0.0875, rest)
+        >>> authors_reward(too_fast).item()
+        -25.0
+    """
+    reward = paper_reward(transition)
+    return jnp.where(transition.terminated, AUTHORS_OVERSPEED_PENALTY, reward)
+
+
+def authors_continuous_reward(transition: Transition) -> Float[Array, ""]:
+    """The same with a price on torque, as in the authors' environment of continuous torques.
+
+    It is half of ‖a‖, where a is the pulse in units of 0.5 N m for 1/240 s; the last step, with
+    its terminal reward, is free.
+
+    Example:
+        >>> goal = jnp.array([0.0, 0.0, 0.0, 1.0])
+        >>> rest, pulse = jnp.zeros(3), jnp.array([0.0, -0.5 / 240, 0.0])
+        >>> pushed = Transition(goal, goal, rest, False, False, 0.00436, 0.0875, pulse)
+        >>> authors_continuous_reward(pushed).item()
+        8.5
+    """
+    price = TORQUE_PRICE / LARGEST_PULSE * square_root(jnp.sum(transition.impulse**2))
+    ended = jnp.logical_or(transition.terminated, transition.truncated)
+    return authors_reward(transition) - jnp.where(ended, 0.0, price)
+
+
 REWARDS: dict[str, Callable[[Transition], Float[Array, ""]]] = {
     "paper": paper_reward,
     "logarithmic": logarithmic_reward,
+    "authors": authors_reward,
+    "authors-continuous": authors_continuous_reward,
 }
 """Rewards by the names that settings and ``gymnasium.make`` know."""

@@ -8,8 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax import checks, dynamics
+from attjax import checks
+from attjax.dynamics import propagation
 from attjax.spacecraft import LM50, Spacecraft
+from attjax.values import check_share, check_truth
 
 
 class EnvState(struct.PyTreeNode):
@@ -84,8 +86,7 @@ def check_params(params: EnvParams, frameskip: int) -> None:
     checks.integer("max_steps_in_episode", params.max_steps_in_episode, 1, 2**31 - 1)
     if params.frameskip is not None:
         checks.integer("params.frameskip", params.frameskip, 0, frameskip)
-    if not isinstance(params.torque_held, bool):
-        raise ValueError(f"params.torque_held is {params.torque_held!r}; it must be True or False")
+    check_truth("params.torque_held", params.torque_held)
 
 
 def applied_torque(action: chex.Numeric, params: EnvParams) -> chex.Array:
@@ -110,6 +111,7 @@ def step(
     action: chex.Numeric,
     params: EnvParams | None = None,
     frameskip: int = 20,
+    kinematic_factor: float = 0.5,
 ) -> EnvState:
     """One agent step of one spacecraft: pure, keyless, without reset or end of episode.
 
@@ -119,6 +121,7 @@ def step(
         params: spacecraft, the paper's by default; they also say whether its torques are held.
         frameskip: RK4 steps after the first (static); if ``params.frameskip`` says how many, the
             most there may be.
+        kinematic_factor: what stands in place of Eq. 9's ½ (static).
 
     Returns:
         The state (1 + frameskip)/240 s later.
@@ -135,17 +138,17 @@ def step(
     frameskip = operator.index(frameskip)  # NumPy's own could overflow
     params = default_params(frameskip) if params is None else params
     check_params(params, frameskip)
+    check_share("kinematic_factor", kinematic_factor)
     action = checks.integer("action", action, 0, len(params.torque_table) - 1)
     quaternion = checks.unit_quaternion("quaternion", state.quaternion)
     angular_velocity = checks.real("angular_velocity", state.angular_velocity, (3,))
     moving = quaternion, angular_velocity, applied_torque(action, params), params.inertia
     have_values = all(map(checks.has_value, jax.tree.leaves((moving, params.frameskip))))
-    propagate = _compiled_propagate if have_values else dynamics.propagate
-    quaternion, angular_velocity = propagate(
-        *moving, frameskip, params.frameskip, params.torque_held
-    )
+    agent_step = propagation.AgentStep(frameskip, params.torque_held)
+    take = _compiled_take if have_values else propagation.take
+    quaternion, angular_velocity = take(agent_step, *moving, params.frameskip, kinematic_factor)
     return EnvState(quaternion, angular_velocity, state.time + 1)
 
 
-_compiled_propagate = jax.jit(dynamics.propagate, static_argnames=("frameskip", "held"))
+_compiled_take = jax.jit(propagation.take, static_argnames=("agent_step", "kinematic_factor"))
 """For steps outside ``jit`` and ``vmap``, each of which would compile its loops anew."""

@@ -38,8 +38,8 @@ class FlightPolicy:
         origin: where the parameters come from, and what they were trained for.
 
     Raises:
-        ValueError: a parameter is not finite in float32, or it is not one action alone that has no
-            torque.
+        ValueError: a parameter is not finite in float32, it is not one action alone that has no
+            torque, or the simulator has other rules than Eq. 9 and 11, which a spacecraft obeys.
     """
 
     policy: Policy
@@ -48,6 +48,11 @@ class FlightPolicy:
     origin: Origin
 
     def __post_init__(self):
+        if self.env.kinematic_factor != 0.5:
+            factor = f"{self.env.kinematic_factor:g}"
+            raise ValueError(f"kinematic_factor is {factor}; a spacecraft moves by Eq. 9, with 0.5")
+        if not self.env.observes_quaternion_rate:
+            raise ValueError("observes_quaternion_rate is False; flight software is told of Eq. 11")
         arrays = [x for layer in self.layers for x in (layer.weights, layer.biases)]
         if not all(np.all(np.isfinite(x)) for x in arrays):
             raise ValueError("the policy has parameters that are not finite")

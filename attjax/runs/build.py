@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +11,7 @@ import numpy as np
 
 from attjax.config import user_functions
 from attjax.config.run import Config
-from attjax.config.settings import Settings
+from attjax.config.settings import Settings, Task
 from attjax.control import assurance
 from attjax.control.features import FEATURES
 from attjax.envs import initial_state, simulator
@@ -50,12 +51,25 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
     )
 
 
+<<<<<<< HEAD
 def setup(
     settings: Settings,
     craft: Spacecraft = LM50,
     num_devices: int = 1,
     splits_networks: bool = False,
 ) -> train_state.Setup:
+=======
+def rules(task: Task) -> dict[str, Any]:
+    """What a run's settings say of the motion and of what is observed, for AttitudeEnv.
+
+    A run is judged by the rules that it was trained by, whatever its reward and its starts.
+    """
+    names = "kinematic_factor", "observes_quaternion_rate"
+    return {name: getattr(task, name) for name in names}
+
+
+def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) -> train_state.Setup:
+>>>>>>> rules
     """Environment, policy and settings of a training run.
 
     Raises:
@@ -68,7 +82,8 @@ def setup(
         start = initial_state.NearGoalStarts(
             settings.task.near_goal_share, settings.task.near_goal_steps
         )
-    env = AttitudeEnv(max(settings.task.frameskips), reward, start, craft)
+    frameskip = max(settings.task.frameskips)
+    env = AttitudeEnv(frameskip, reward, start, craft, **rules(settings.task))
     if settings.task.reward not in REWARDS:
         first_reward = functools.partial(_first_reward, env)
         user_functions.check(

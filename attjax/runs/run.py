@@ -79,7 +79,8 @@ class Run:
     def env(self) -> AttitudeEnv:
         """The spacecraft's task as it is judged: at 40 Hz, or the trained rate nearest to it."""
         frameskip = frameskip_to_judge(self.config.settings.task.frameskips)
-        return AttitudeEnv(frameskip, spacecraft=self.config.spacecraft)
+        rules = build.rules(self.config.settings.task)
+        return AttitudeEnv(frameskip, spacecraft=self.config.spacecraft, **rules)
 
     @property
     def metrics(self) -> dict[str, np.ndarray]:

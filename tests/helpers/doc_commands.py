@@ -63,7 +63,7 @@ def known_flags() -> set[str]:
             script.parse_arguments(["--help"])
     scripts = [*ROOT.glob("benchmarks/*.py"), *map(ROOT.joinpath, CAMPAIGNS)]
     sources = [path.read_text() for path in scripts]
-    help_text = text.getvalue().replace("--[no-]", "--")
+    help_text = re.sub(r"--\[no-\]([\w-]+)", r"--\1 --no-\1", text.getvalue())
     return set(re.findall(r"--[a-z][\w-]*", help_text)) | {
         flag for source in sources for flag in re.findall(r'"(--[a-z][\w-]*)"', source)
     }

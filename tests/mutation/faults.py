@@ -31,7 +31,7 @@ FAULTS = {
     ),
     "missing ½ in the kinematics": (
         "attjax/dynamics/quaternion.py",
-        "0.5 * (w3 * q2 - w2 * q3 + w1 * qs)", "(w3 * q2 - w2 * q3 + w1 * qs)",
+        "factor * (w3 * q2 - w2 * q3 + w1 * qs)", "(w3 * q2 - w2 * q3 + w1 * qs)",
         PHYSICS,
     ),
     "wrong order in RK4": (

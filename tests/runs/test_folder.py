@@ -16,6 +16,14 @@ from attjax.config.presets import PRECISE
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
 
+LATER = (
+    "initial_weights",
+    "kinematic_factor",
+    "most_minibatches",
+    "observes_quaternion_rate",
+)
+"""Settings that there were none of in formats 5 and 6."""
+
 
 def test_config_round_trip(tmp_path):
     run_folder.create(tmp_path, CONFIG, overwrite=False)
@@ -46,7 +54,7 @@ def as_format_5(folder):
     """Rewrite a run's config.json as versions did that had the settings in one table."""
     content = json.loads((folder / "config.json").read_text())
     settings = {k: x for subject in content["settings"].values() for k, x in subject.items()}
-    for name in ("initial_weights", "most_minibatches"):
+    for name in LATER:
         del settings[name]
     content |= {"format": 5, "settings": settings}
     (folder / "config.json").write_text(json.dumps(content))
@@ -58,12 +66,12 @@ def test_a_run_of_format_6_is_read_as_it_was_meant(tmp_path):
     path = tmp_path / "config.json"
     content = json.loads(path.read_text())
     for subject in content["settings"].values():
-        for name in ("initial_weights", "most_minibatches"):
+        for name in LATER:
             subject.pop(name, None)
     path.write_text(json.dumps(content | {"format": 6}))
     assert run_folder.read_config(tmp_path) == CONFIG
     path.write_text(json.dumps(content))
-    with pytest.raises(FolderError, match="missing: initial_weights, most_minibatches"):
+    with pytest.raises(FolderError, match="missing: " + ", ".join(sorted(LATER))):
         run_folder.read_config(tmp_path)
 
 
