@@ -51,14 +51,6 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
     )
 
 
-<<<<<<< HEAD
-def setup(
-    settings: Settings,
-    craft: Spacecraft = LM50,
-    num_devices: int = 1,
-    splits_networks: bool = False,
-) -> train_state.Setup:
-=======
 def rules(task: Task) -> dict[str, Any]:
     """What a run's settings say of the motion and of what is observed, for AttitudeEnv.
 
@@ -68,8 +60,12 @@ def rules(task: Task) -> dict[str, Any]:
     return {name: getattr(task, name) for name in names}
 
 
-def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) -> train_state.Setup:
->>>>>>> rules
+def setup(
+    settings: Settings,
+    craft: Spacecraft = LM50,
+    num_devices: int = 1,
+    splits_networks: bool = False,
+) -> train_state.Setup:
     """Environment, policy and settings of a training run.
 
     Raises:
