@@ -13,17 +13,13 @@ from attjax.dynamics import rigid_body
 from attjax.envs import initial_state, simulator, spaces
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
+from attjax.envs.keys import observation_key, steps_key
 from attjax.envs.reward import Transition, paper_reward
 from attjax.envs.simulator import EnvParams, EnvState
 from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
 from attjax.values import integer
 
-_OBSERVATION, _STEPS = np.uint32(2**32 - 1), np.uint32(2**32 - 2)
-"""What ``fold_in`` derives keys with that share nothing with the one they come from.
-
-``uniform``, ``split`` and ``fold_in`` all encrypt numbers with the key: the first two 0, 1, 2, …,
-the last the one that it is given, which must therefore be one that no draw counts up to.
-"""
+ACTIONS = ("discrete", "continuous")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,9 +32,12 @@ class AttitudeEnv:
         reward: function of a :class:`attjax.envs.reward.Transition`.
         initial_state: function of a key and parameters that draws the start of an episode.
         spacecraft: what flies, and its task; ``default_params`` are its.
+        actions: "discrete", rows of the torque table; or "continuous", (3,) torques about the
+            body axes at once, in fractions from −1 to 1 of the table's largest, clipped there.
 
     Raises:
-        ValueError: frameskip is no integer from 0 on, or an agent step exceeds the episode.
+        ValueError: frameskip is no integer from 0 on, an agent step exceeds the episode, or the
+            actions are others, or continuous with torques that are along no body axis.
 
     Example:
         >>> env = AttitudeEnv(frameskip=20)
@@ -51,6 +50,7 @@ class AttitudeEnv:
     reward: Callable[[Transition], chex.Array] = paper_reward
     initial_state: Callable[[chex.PRNGKey, EnvParams], EnvState] = initial_state.initial_state
     spacecraft: Spacecraft = LM50
+    actions: str = "discrete"
 
     def __post_init__(self):
         most = self.spacecraft.most_frameskip
@@ -60,12 +60,27 @@ class AttitudeEnv:
                 f"frameskip is {self.frameskip!r}; it must be an integer from 0 to {most}"
             )
         object.__setattr__(self, "frameskip", frameskip)  # as JAX compiles for each it is told of
+        if not isinstance(self.actions, str) or self.actions not in ACTIONS:
+            allowed = " or ".join(map(repr, ACTIONS))
+            raise ValueError(f"actions is {self.actions!r}; it must be {allowed}")
+        if self._is_continuous:
+            simulator.largest_torques(np.array(self.spacecraft.torque_table))  # checks the axes
 
     name = "AttitudeEnv"
 
     @property
+    def _is_continuous(self):
+        return self.actions == "continuous"
+
+    @property
     def num_actions(self) -> int:
-        """Torques to choose from; the paper's Table 1 has 19."""
+        """Torques to choose from; the paper's Table 1 has 19.
+
+        Raises:
+            AttributeError: actions are continuous.
+        """
+        if self._is_continuous:
+            raise AttributeError("num_actions: there is no number of continuous actions")
         return self.spacecraft.num_actions
 
     @property
@@ -82,7 +97,14 @@ class AttitudeEnv:
         """What a controller may know of this environment."""
         period = self._period(params)
         duration = period if params.torque_held else INTEGRATION_STEP
-        return Context(period, params.inertia, params.torque_table, params.rate_limit, duration)
+        return Context(
+            control_period=period,
+            inertia=params.inertia,
+            torque_table=params.torque_table,
+            rate_limit=params.rate_limit,
+            torque_duration=duration,
+            continuous=self._is_continuous,
+        )
 
     def _period(self, params):
         frameskip = self.frameskip if params.frameskip is None else params.frameskip
@@ -151,7 +173,7 @@ class AttitudeEnv:
             ``info["torque"]``, (3,), N m, body frame, is what acted for the context's
             ``torque_duration``.
         """
-        next_state = simulator.step(state, action, params, self.frameskip)
+        next_state = simulator.step(state, action, params, self.frameskip, self.actions)
         torque = simulator.applied_torque(action, params)
         rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2))
         terminated = rate > params.rate_limit
@@ -212,21 +234,10 @@ class AttitudeEnv:
         high = jnp.stack([one] * 4 + [rate / 2] * 4 + [rate] * 3)
         return spaces.Box(-high, high)
 
-    def action_space(self, params: EnvParams | None = None) -> spaces.Discrete:
-        """The rows of the torque table."""
-        return spaces.Discrete(self.num_actions if params is None else len(params.torque_table))
-
-
-def observation_key(key: chex.PRNGKey) -> chex.PRNGKey:
-    """The key of an episode's first observation, from the key of its reset."""
-    return jax.random.fold_in(key, _OBSERVATION)
-
-
-def steps_key(key: chex.PRNGKey) -> chex.PRNGKey:
-    """The key of an episode's steps, from the key of its reset; a step's is folded in from it.
-
-    Example:
-        >>> key = steps_key(jax.random.key(0))
-        >>> third = jax.random.fold_in(key, 2)
-    """
-    return jax.random.fold_in(key, _STEPS)
+    def action_space(self, params: EnvParams | None = None) -> spaces.Discrete | spaces.Box:
+        """The rows of the torque table, or fractions of its largest torque about each body axis."""
+        table = (self.default_params if params is None else params).torque_table
+        if self._is_continuous:
+            one = jnp.ones_like(table, shape=3)
+            return spaces.Box(-one, one)
+        return spaces.Discrete(len(table))

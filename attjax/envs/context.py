@@ -17,6 +17,8 @@ class Context:
         torque_table: (actions, 3) torque of each action, body frame, N m.
         rate_limit: largest admissible ‖ω‖, rad/s.
         torque_duration: how long a torque acts, from the beginning of a control period, s.
+        continuous: whether an action is (3,) fractions of the largest torque about each body axis
+            instead of a row of the table; a Python bool.
     """
 
     control_period: chex.Array
@@ -24,8 +26,11 @@ class Context:
     torque_table: chex.Array
     rate_limit: chex.Array
     torque_duration: chex.Numeric = INTEGRATION_STEP
+    continuous: bool = struct.field(pytree_node=False, default=False)
 
     @property
     def largest_torque(self) -> chex.Array:
-        """The largest magnitude in the torque table, N m."""
+        """The largest magnitude of a torque, N m: of the table, or of all three axes at once."""
+        if self.continuous:
+            return jnp.sqrt(jnp.sum(jnp.max(self.torque_table**2, axis=0)))
         return jnp.sqrt(jnp.max(jnp.sum(self.torque_table**2, axis=-1)))
