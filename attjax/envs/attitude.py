@@ -228,7 +228,10 @@ class AttitudeEnv:
         """
         moments = rigid_body.principal_moments(params.inertia)
         context = self.context(params)
-        kick = context.largest_torque * context.torque_duration / jnp.min(moments)
+        torque = context.largest_torque
+        if self._is_continuous:
+            torque = jnp.linalg.norm(simulator.largest_torques(context.torque_table))
+        kick = torque * context.torque_duration / jnp.min(moments)
         rate = (params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))
         one = jnp.ones_like(rate)
         high = jnp.stack([one] * 4 + [rate / 2] * 4 + [rate] * 3)

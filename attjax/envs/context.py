@@ -30,7 +30,5 @@ class Context:
 
     @property
     def largest_torque(self) -> chex.Array:
-        """The largest magnitude of a torque, N m: of the table, or of all three axes at once."""
-        if self.continuous:
-            return jnp.sqrt(jnp.sum(jnp.max(self.torque_table**2, axis=0)))
+        """The largest magnitude in the torque table, N m."""
         return jnp.sqrt(jnp.max(jnp.sum(self.torque_table**2, axis=-1)))

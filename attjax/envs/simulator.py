@@ -130,9 +130,8 @@ def largest_torques(torque_table: chex.Array) -> chex.Array:
         >>> largest_torques(default_params().torque_table).tolist()
         [0.5, 0.5, 0.5]
     """
-    magnitudes = abs(torque_table)
     if checks.has_value(torque_table):
-        _, second, first = np.sort(np.asarray(magnitudes)).T
+        _, second, first = np.sort(np.abs(torque_table)).T
         if np.any(skew := second > checks.ROUNDING * first):
             row = int(np.argmax(skew))
             listed = np.array2string(np.asarray(torque_table)[row], precision=3)
@@ -140,7 +139,7 @@ def largest_torques(torque_table: chex.Array) -> chex.Array:
                 f"torque_table has {listed} in row {row}; for continuous actions each torque must "
                 f"be along a body axis"
             )
-    return jnp.max(magnitudes, axis=0)
+    return jnp.max(jnp.abs(torque_table), axis=0)
 
 
 def step(

@@ -97,6 +97,9 @@ def test_jit_and_vmap_and_automatic_reset():
     stepped = jax.jit(jax.vmap(ENV.step, (0, 0, 0, None)))(
         jax.random.split(KEY, 6), states, actions, params
     )
+    constant = jax.jit(lambda *x: jax.vmap(ENV.step, (0, 0, 0, None))(*x, params))
+    same = constant(jax.random.split(KEY, 6), states, actions)
+    np.testing.assert_allclose(same[1].angular_velocity, stepped[1].angular_velocity, atol=1e-7)
     assert stepped[4].tolist() == [False, False, True] * 2
     for i in range(2):
         alone = attjax.step(jax.tree.map(lambda x, i=i: x[i], states), actions[i], params, 5)
