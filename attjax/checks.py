@@ -79,6 +79,30 @@ def integer(name: str, x: Any, low: int, high: int) -> chex.Array:
     return x
 
 
+def decision(x: Any, count: int, kind: str | None = None) -> chex.Array:
+    """Return x as an action: an integer scalar from 0 to count − 1, or (3,) real fractions.
+
+    Args:
+        x: anything that ``jnp.asarray`` takes.
+        count: rows of the torque table.
+        kind: "discrete" or "continuous": only the integer, or only the fractions.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    x = _array("action", x)
+    if kind == "continuous":
+        return real("action", x, (3,))
+    if kind is None and jnp.issubdtype(x.dtype, jnp.floating):
+        if x.shape != (3,):
+            raise ValueError(
+                f"action has type {x.dtype}; it must be an integer, or have shape (3,) and not "
+                f"{x.shape}"
+            )
+        return real("action", x, (3,))
+    return integer("action", x, 0, count - 1)
+
+
 def action(x: Any, count: int) -> int:
     """Return x, or the one element of an array, as an integer from 0 to count − 1.
 
@@ -111,6 +135,25 @@ def actions(x: Any, batch: int, count: int) -> np.ndarray:
         if not 0 <= extreme < count:
             raise ValueError(f"actions holds {extreme}; each must be from 0 to {count - 1}")
     return x.astype(np.int32)
+
+
+def fractions(name: str, x: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Return x as fractions of the largest torques, float32, clipped to [−1, 1].
+
+    For steps from Python.
+
+    Raises:
+        ValueError: it is no array of finite real numbers of that shape.
+    """
+    x = np.asarray(x)
+    is_real = np.issubdtype(x.dtype, np.integer) or np.issubdtype(x.dtype, np.floating)
+    if x.shape != shape or not is_real:
+        raise ValueError(
+            f"{name} has shape {x.shape} and type {x.dtype}; it must be {shape} real numbers"
+        )
+    if not np.all(np.isfinite(x)):
+        raise ValueError(f"{name} is {_shown(x)}; it must be finite")
+    return np.clip(x, -1, 1).astype(np.float32)
 
 
 def unit_quaternion(name: str, x: Any) -> chex.Array:

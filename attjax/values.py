@@ -114,3 +114,14 @@ def shown(values: object) -> str:
     if not isinstance(values, tuple):
         return repr(values)
     return f"[{', '.join(map(shown, values))}]"
+
+
+def check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    """Check that a value is one of some words.
+
+    Raises:
+        ValueError: it is not.
+    """
+    if not isinstance(value, str) or value not in choices:
+        allowed = " or ".join(map(repr, choices))
+        raise ValueError(f"{name} is {value!r}; it must be {allowed}")

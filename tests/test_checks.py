@@ -11,6 +11,7 @@ from attjax.envs import batch
 from attjax.ppo.networks import Policy
 
 ENV = AttitudeEnv(frameskip=5)
+CONTINUOUS = AttitudeEnv(frameskip=5, actions="continuous")
 PARAMS = ENV.default_params
 GOAL = EnvState(jnp.array([0.0, 0, 0, 1]), jnp.zeros(3), 0)
 
@@ -64,6 +65,48 @@ def test_actions(action, expected):
 
 
 @pytest.mark.parametrize(
+    "action, expected",
+    [
+        ([0.5, 0.5], "action has shape (2,); it must be (3,)"),
+        ([0.5, np.nan, 0], "nan 0. ]; it must be finite"),
+        (np.zeros((3, 3)), "action has shape (3, 3); it must be (3,)"),
+        (0.5, "action has shape (); it must be (3,)"),
+        (1, "action has type int32; it must be floating-point"),
+        ([1, 0, 0], "action has type int32; it must be floating-point"),
+        ("up", "action is str; it must be an array of numbers"),
+    ],
+)
+def test_continuous_actions(action, expected):
+    arguments = jax.random.key(0), GOAL, action, PARAMS
+    assert expected in message(CONTINUOUS.step_env, *arguments)
+    assert expected in message(CONTINUOUS.step, *arguments)
+
+
+def test_a_step_says_both_that_an_action_may_be():
+    for action, shape in ((1.5, "()"), ([0.5, 0.5], "(2,)")):
+        expected = f"it must be an integer, or have shape (3,) and not {shape}"
+        assert message(step, GOAL, action) == f"action has type float32; {expected}"
+    assert "it must be finite" in message(step, GOAL, [0.0, np.inf, 0.0])
+    assert "must be an integer" in message(ENV.step_env, None, GOAL, np.zeros(3), PARAMS)
+    with pytest.raises(ValueError, match="it must be an integer"):
+        jax.jit(jax.vmap(ENV.step_env, (None, None, 0, None)))(None, GOAL, np.zeros((2, 3)), PARAMS)
+
+
+def test_kinds_of_actions_and_axes_that_have_none():
+    for kind in ("Continuous", None, 3, True, np.zeros(2), ["discrete"]):
+        expected = "it must be 'discrete' or 'continuous'"
+        assert expected in message(lambda kind: AttitudeEnv(actions=kind), kind)
+    skew = Spacecraft(torque_axes=((1, 0, 0), (0, 1, 1)))
+    assert AttitudeEnv(spacecraft=skew).num_actions == 13
+    expected = "in row 3; for continuous actions each torque must be along a body axis"
+    assert expected in message(lambda: AttitudeEnv(spacecraft=skew, actions="continuous"))
+    params = AttitudeEnv(spacecraft=skew).default_params
+    assert expected in message(step, GOAL, np.zeros(3), params)
+    for axis in ((1, 1e-7, 0), (0, 0, -2)):  # but for rounding, along one
+        AttitudeEnv(spacecraft=Spacecraft(torque_axes=(axis,)), actions="continuous")
+
+
+@pytest.mark.parametrize(
     "field, value, expected",
     [
         ("inertia", [1.0, 0, 1], "principal moments [0. 1. 1.]; they must be positive"),
@@ -104,7 +147,10 @@ def test_batches_of_the_fused_rollout():
     _, states = jax.vmap(ENV.reset)(jax.random.split(jax.random.key(0), 4))
     for actions, devices, expected in (
         (np.zeros(4, int), 1, "actions has shape (4,)"),
-        (np.zeros((3, 4)), 1, "it must be (steps, batch) integers"),
+        (np.zeros((3, 4)), 1, "it must be (steps, batch) integers or (steps, batch, 3) real"),
+        (np.zeros((3, 4, 2)), 1, "it must be (steps, batch) integers or (steps, batch, 3) real"),
+        (np.zeros((3, 4, 3), int), 1, "actions has shape (3, 4, 3) and type int32"),
+        (np.zeros((3, 4, 3)), 1, "action has type float32; it must be an integer"),
         (np.zeros((3, 5), int), 1, "states has leading axes [(4,)]; they must be (5,)"),
         (np.zeros((3, 4), int), 3, "num_devices is 3; it must be a divisor"),
         (np.zeros((3, 4), int), 0, "num_devices is 0"),

@@ -1,7 +1,8 @@
-"""Classical controllers on the same discrete torques, with the signature of a policy.
+"""Classical controllers on the same torques, with the signature of a policy.
 
 ``act(observation (11,), context) -> action``. Both ask for an angular velocity and take the
-action whose impulse comes nearest to the one that leads there.
+action whose impulse comes nearest to the one that leads there; where ``context.continuous``, that
+impulse itself, as far as the torques can give it.
 """
 
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from attjax import checks
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
 from attjax.envs import observation as observations
+from attjax.envs import simulator
 from attjax.envs.context import Context
 
 BRAKING_MARGIN = 0.75
@@ -33,21 +35,22 @@ def phase_plane(observation: chex.Array, context: Context) -> chex.Array:
 
     With the impulses shared among the axes so that all arrive together, the angle |θ| that
     remains can be braked from the rate ω = −θ √(2 η U / Σ|I θ|), where U is the largest
-    torque averaged over a control period and η the braking margin. Close to the goal the
-    rate is limited to a share of θ in each period. (θ is what ω must integrate to; by other
-    kinematics than Eq. 9's that is not the angle.)
+    torque averaged over a control period and η the braking margin. Continuous torques brake all
+    axes at once, and the one that takes longest rules: max|I θ| in place of the sum. Close to
+    the goal the rate is limited to a share of θ in each period. (θ is what ω must integrate to;
+    by other kinematics than Eq. 9's that is not the angle.)
 
     Args:
         observation: (11,) Eq. 11.
         context: the spacecraft and its actions.
 
     Returns:
-        The action, an integer scalar.
+        The action: an integer scalar, or (3,) fractions where the context says so.
     """
     observation = checks.real("observation", observation, (observations.SIZE,))
     angle = quaternions.rotation_vector(observation[observations.QUATERNION])
     angle = context.integral_of_rate(angle)
-    momentum = jnp.sum(jnp.abs(rigid_body.angular_momentum(context.inertia, angle)))
+    momentum = momentum_to_give(angle, context)
     braking = jnp.sqrt(2 * BRAKING_MARGIN * average_torque(context) / jnp.maximum(momentum, 1e-12))
     gain = jnp.minimum(braking, TERMINAL_GAIN / context.control_period)
     return nearest_action(-gain * angle, observation, context)
@@ -75,19 +78,40 @@ def average_torque(context: Context) -> chex.Array:
     return context.largest_torque * context.torque_duration / context.control_period
 
 
+def momentum_to_give(angle: chex.Array, context: Context) -> chex.Array:
+    """What :func:`average_torque` must give for a turn by a (3,) angle in a second, N m s.
+
+    Of torques about one axis at a time, Σ|I θ|. Of continuous ones, which act about all at once,
+    the largest |I θ|, each in proportion to the largest torque about its axis.
+    """
+    momentum = jnp.abs(rigid_body.angular_momentum(context.inertia, angle))
+    if not context.continuous:
+        return jnp.sum(momentum)
+    return jnp.max(context.largest_torque * _over(momentum, context))
+
+
 def nearest_action(
     wanted_rate: chex.Array, observation: chex.Array, context: Context
 ) -> chex.Array:
     """The action whose impulse is nearest to I (wanted rate − ω), for a (3,) wanted rate.
 
-    The wanted rate is first scaled back to within the rate limit's margin.
+    The wanted rate is first scaled back to within the rate limit's margin. Of continuous actions it
+    is that impulse, about each axis as far as the torque can give it.
     """
     rate = jnp.sqrt(jnp.sum(wanted_rate**2))
     scale = jnp.minimum(1.0, RATE_MARGIN * context.rate_limit / jnp.maximum(rate, 1e-12))
     change = wanted_rate * scale - observation[observations.ANGULAR_VELOCITY]
     impulse = rigid_body.angular_momentum(context.inertia, change)
+    if context.continuous:
+        return jnp.clip(_over(impulse / context.torque_duration, context), -1, 1)
     missing = context.torque_table * context.torque_duration - impulse
     return jnp.argmin(jnp.sum(missing**2, axis=-1))
+
+
+def _over(vector, context):
+    """A (3,) vector over the largest torque about each axis; 0 where there is none."""
+    largest = simulator.largest_torques(context.torque_table)
+    return jnp.where(largest > 0, vector / jnp.where(largest > 0, largest, 1), 0)
 
 
 CONTROLLERS: dict[str, Callable[[chex.Array, Context], chex.Array]] = {

@@ -1,10 +1,9 @@
 """How long a slew must take."""
 
 import chex
-import jax.numpy as jnp
 
-from attjax.control.classical import average_torque
-from attjax.dynamics import numerics, rigid_body
+from attjax.control.classical import average_torque, momentum_to_give
+from attjax.dynamics import numerics
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.context import Context
 
@@ -13,8 +12,8 @@ def time_optimal_reference(quaternion: chex.Array, context: Context) -> chex.Arr
     """Rest-to-rest time of a (4,) slew with decoupled axes, T = 2 √(Σ|θᵢ|Iᵢ/U), s.
 
     U is the largest torque averaged over a control period. An estimate and no bound: turning
-    about other axes than the eigenaxis can be about a tenth quicker.
+    about other axes than the eigenaxis can be about a tenth quicker. Continuous torques act about
+    all axes at once: the largest |θᵢ|Iᵢ in place of the sum.
     """
     angle = context.integral_of_rate(quaternions.rotation_vector(quaternion))
-    momentum = jnp.abs(rigid_body.angular_momentum(context.inertia, angle))
-    return 2 * numerics.square_root(jnp.sum(momentum) / average_torque(context))
+    return 2 * numerics.square_root(momentum_to_give(angle, context) / average_torque(context))

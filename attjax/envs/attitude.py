@@ -13,17 +13,13 @@ from attjax.dynamics import rigid_body
 from attjax.envs import initial_state, simulator, spaces
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
+from attjax.envs.keys import observation_key, steps_key
 from attjax.envs.reward import Transition, paper_reward
 from attjax.envs.simulator import EnvParams, EnvState
 from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
-from attjax.values import check_share, check_truth, integer
+from attjax.values import check_choice, check_share, check_truth, integer
 
-_OBSERVATION, _STEPS = np.uint32(2**32 - 1), np.uint32(2**32 - 2)
-"""What ``fold_in`` derives keys with that share nothing with the one they come from.
-
-``uniform``, ``split`` and ``fold_in`` all encrypt numbers with the key: the first two 0, 1, 2, …,
-the last the one that it is given, which must therefore be one that no draw counts up to.
-"""
+ACTIONS = ("discrete", "continuous")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,10 +36,12 @@ class AttitudeEnv:
             turns twice as fast at the same ω.
         observes_quaternion_rate: whether Eq. 11's q̇ is observed; the authors' public code never
             works it out, and shows zeros.
+        actions: "discrete", rows of the torque table; or "continuous", (3,) torques about the
+            body axes at once, in fractions from −1 to 1 of the table's largest, clipped there.
 
     Raises:
-        ValueError: frameskip is no integer from 0 on, an agent step exceeds the episode, or
-            another value is not as said.
+        ValueError: frameskip is no integer from 0 on, an agent step exceeds the episode, another
+            value is not as said, or actions are continuous with torques along no body axis.
 
     Example:
         >>> env = AttitudeEnv(frameskip=20)
@@ -58,6 +56,7 @@ class AttitudeEnv:
     spacecraft: Spacecraft = LM50
     kinematic_factor: float = 0.5
     observes_quaternion_rate: bool = True
+    actions: str = "discrete"
 
     def __post_init__(self):
         most = self.spacecraft.most_frameskip
@@ -69,12 +68,25 @@ class AttitudeEnv:
         object.__setattr__(self, "frameskip", frameskip)  # as JAX compiles for each it is told of
         check_share("kinematic_factor", self.kinematic_factor)
         check_truth("observes_quaternion_rate", self.observes_quaternion_rate)
+        check_choice("actions", self.actions, ACTIONS)
+        if self._is_continuous:
+            simulator.largest_torques(np.array(self.spacecraft.torque_table))  # checks the axes
 
     name = "AttitudeEnv"
 
     @property
+    def _is_continuous(self):
+        return self.actions == "continuous"
+
+    @property
     def num_actions(self) -> int:
-        """Torques to choose from; the paper's Table 1 has 19."""
+        """Torques to choose from; the paper's Table 1 has 19.
+
+        Raises:
+            AttributeError: actions are continuous.
+        """
+        if self._is_continuous:
+            raise AttributeError("num_actions: there is no number of continuous actions")
         return self.spacecraft.num_actions
 
     @property
@@ -92,7 +104,7 @@ class AttitudeEnv:
         period = self._period(params)
         duration = period if params.torque_held else INTEGRATION_STEP
         spacecraft = params.inertia, params.torque_table, params.rate_limit
-        return Context(period, *spacecraft, duration, self.kinematic_factor)
+        return Context(period, *spacecraft, duration, self.kinematic_factor, self._is_continuous)
 
     def _period(self, params):
         frameskip = self.frameskip if params.frameskip is None else params.frameskip
@@ -161,7 +173,8 @@ class AttitudeEnv:
             ``info["torque"]``, (3,), N m, body frame, is what acted for the context's
             ``torque_duration``.
         """
-        next_state = simulator.step(state, action, params, self.frameskip, self.kinematic_factor)
+        rules = self.frameskip, self.kinematic_factor, self.actions
+        next_state = simulator.step(state, action, params, *rules)
         torque = simulator.applied_torque(action, params)
         rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2))
         terminated = rate > params.rate_limit
@@ -217,27 +230,19 @@ class AttitudeEnv:
         """
         moments = rigid_body.principal_moments(params.inertia)
         context = self.context(params)
-        kick = context.largest_torque * context.torque_duration / jnp.min(moments)
+        torque = context.largest_torque
+        if self._is_continuous:
+            torque = jnp.linalg.norm(simulator.largest_torques(context.torque_table))
+        kick = torque * context.torque_duration / jnp.min(moments)
         rate = (params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))
         one = jnp.ones_like(rate)
         high = jnp.stack([one] * 4 + [self.kinematic_factor * rate] * 4 + [rate] * 3)
         return spaces.Box(-high, high)
 
-    def action_space(self, params: EnvParams | None = None) -> spaces.Discrete:
-        """The rows of the torque table."""
-        return spaces.Discrete(self.num_actions if params is None else len(params.torque_table))
-
-
-def observation_key(key: chex.PRNGKey) -> chex.PRNGKey:
-    """The key of an episode's first observation, from the key of its reset."""
-    return jax.random.fold_in(key, _OBSERVATION)
-
-
-def steps_key(key: chex.PRNGKey) -> chex.PRNGKey:
-    """The key of an episode's steps, from the key of its reset; a step's is folded in from it.
-
-    Example:
-        >>> key = steps_key(jax.random.key(0))
-        >>> third = jax.random.fold_in(key, 2)
-    """
-    return jax.random.fold_in(key, _STEPS)
+    def action_space(self, params: EnvParams | None = None) -> spaces.Discrete | spaces.Box:
+        """The rows of the torque table, or fractions of its largest torque about each body axis."""
+        table = (self.default_params if params is None else params).torque_table
+        if self._is_continuous:
+            one = jnp.ones_like(table, shape=3)
+            return spaces.Box(-one, one)
+        return spaces.Discrete(len(table))

@@ -55,7 +55,7 @@ def step(
         params: its parameters; those in which the spacecraft differ have a leading axis (batch,).
         key: of this step.
         states: batched states, (batch, ...).
-        actions: (batch,) integers.
+        actions: (batch,) integers, or (batch, 3) real, as the environment takes them.
 
     Returns:
         What ``env.step`` returns, each with a leading axis (batch,).
@@ -152,7 +152,7 @@ def open_loop(
         env, params: as in :func:`step`.
         key: of all new episodes.
         states: batched states, (batch, ...); donated.
-        actions: (steps, batch) integers.
+        actions: (steps, batch) integers, or (steps, batch, 3) real, as the environment takes them.
         num_devices: devices, or CPU cores as devices, that share the batch; it must be a
             multiple of them. JAX makes one device of all cores, unless the configuration
             ``jax_num_cpu_devices`` says otherwise before its first use.
@@ -161,7 +161,7 @@ def open_loop(
         The states, the observations (batch, size) after the last step, and the totals.
 
     Raises:
-        ValueError: the actions are no such integers, the states are of another batch, or the
+        ValueError: the actions are no such arrays, the states are of another batch, or the
             devices are too many or do not share it evenly.
     """
     _check_batch(states, actions, num_devices)
@@ -175,10 +175,12 @@ def open_loop(
 
 
 def _check_batch(states, actions, num_devices):
-    if actions.ndim != 2 or not jnp.issubdtype(actions.dtype, jnp.integer):
+    are_integers = actions.ndim == 2 and jnp.issubdtype(actions.dtype, jnp.integer)
+    are_real = actions.shape[2:] == (3,) and jnp.issubdtype(actions.dtype, jnp.floating)
+    if not are_integers and not are_real:
         raise ValueError(
             f"actions has shape {actions.shape} and type {actions.dtype}; "
-            f"it must be (steps, batch) integers"
+            f"it must be (steps, batch) integers or (steps, batch, 3) real"
         )
     batch = actions.shape[1]
     sizes = {x.shape[:1] for x in jax.tree.leaves(states)}
@@ -193,12 +195,12 @@ def _check_batch(states, actions, num_devices):
 
 def _fly_in_blocks(env, params, keys, states, actions):
     """A device's part of the batch; on CPU block after block, each small enough for the cache."""
-    steps, batch = actions.shape
+    steps, batch, *axes = actions.shape
     on_cpu = jax.devices()[0].platform == "cpu"
     blocks = batch // CPU_BLOCK if on_cpu and batch % CPU_BLOCK == 0 else 1
     keys = jax.random.split(keys[jax.lax.axis_index(AXIS)], blocks)
     states = jax.tree.map(lambda x: x.reshape(blocks, -1, *x.shape[1:]), states)
-    actions = actions.reshape(steps, blocks, -1).swapaxes(0, 1)
+    actions = actions.reshape(steps, blocks, -1, *axes).swapaxes(0, 1)
     flown = jax.lax.map(lambda block: _fly(env, params, *block), (keys, states, actions))
     return jax.tree.map(lambda x: x.reshape(batch, *x.shape[2:]), flown)
 

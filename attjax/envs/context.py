@@ -18,6 +18,8 @@ class Context:
         rate_limit: largest admissible ‖ω‖, rad/s.
         torque_duration: how long a torque acts, from the beginning of a control period, s.
         kinematic_factor: of the kinematics, ½ by Eq. 9; a Python float.
+        continuous: whether an action is (3,) fractions of the largest torque about each body axis
+            instead of a row of the table; a Python bool.
     """
 
     control_period: chex.Array
@@ -26,6 +28,7 @@ class Context:
     rate_limit: chex.Array
     torque_duration: chex.Numeric = INTEGRATION_STEP
     kinematic_factor: float = struct.field(pytree_node=False, default=0.5)
+    continuous: bool = struct.field(pytree_node=False, default=False)
 
     @property
     def largest_torque(self) -> chex.Array:

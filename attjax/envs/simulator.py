@@ -93,17 +93,54 @@ def applied_torque(action: chex.Numeric, params: EnvParams) -> chex.Array:
     """The torque that an action gives: the one way from a decision to what turns the spacecraft.
 
     Args:
-        action: integer scalar, row of the torque table (Table 1).
+        action: integer scalar, row of the torque table (Table 1); or (3,) real, fractions of
+            :func:`largest_torques`, clipped to [−1, 1].
         params: of the spacecraft.
 
     Returns:
         (3,) torque, body frame, N m, for as long as the environment's context says.
 
+    Raises:
+        ValueError: the action is real, and the table as :func:`largest_torques` says.
+
     Example:
         >>> applied_torque(3, default_params()).tolist()
         [0.0, 0.5, 0.0]
+        >>> applied_torque(jnp.array([0.5, -1.0, 2.0]), default_params()).tolist()
+        [0.25, -0.5, 0.5]
     """
-    return params.torque_table[action]
+    if np.ndim(action) == 0:
+        return params.torque_table[action]
+    largest = largest_torques(params.torque_table)
+    return jnp.clip(jnp.asarray(action, largest.dtype), -1, 1) * largest
+
+
+def largest_torques(torque_table: chex.Array) -> chex.Array:
+    """Largest torque about each body axis, N m: what real actions give fractions of.
+
+    Args:
+        torque_table: (actions, 3) torques, body frame, N m.
+
+    Returns:
+        (3,) N m; 0 about an axis that no torque has.
+
+    Raises:
+        ValueError: a torque is along no body axis, and so not to be had about one of them alone.
+
+    Example:
+        >>> largest_torques(default_params().torque_table).tolist()
+        [0.5, 0.5, 0.5]
+    """
+    if checks.has_value(torque_table):
+        _, second, first = np.sort(np.abs(torque_table)).T
+        if np.any(skew := second > checks.ROUNDING * first):
+            row = int(np.argmax(skew))
+            listed = np.array2string(np.asarray(torque_table)[row], precision=3)
+            raise ValueError(
+                f"torque_table has {listed} in row {row}; for continuous actions each torque must "
+                f"be along a body axis"
+            )
+    return jnp.max(jnp.abs(torque_table), axis=0)
 
 
 def step(
@@ -112,16 +149,19 @@ def step(
     params: EnvParams | None = None,
     frameskip: int = 20,
     kinematic_factor: float = 0.5,
+    actions: str | None = None,
 ) -> EnvState:
     """One agent step of one spacecraft: pure, keyless, without reset or end of episode.
 
     Args:
         state: the spacecraft before the step.
-        action: integer scalar, row of the torque table (Table 1).
+        action: integer scalar, row of the torque table (Table 1); or (3,) real, as
+            :func:`applied_torque` says.
         params: spacecraft, the paper's by default; they also say whether its torques are held.
         frameskip: RK4 steps after the first (static); if ``params.frameskip`` says how many, the
             most there may be.
         kinematic_factor: what stands in place of Eq. 9's ½ (static).
+        actions: "discrete" or "continuous", to take only integers or only fractions.
 
     Returns:
         The state (1 + frameskip)/240 s later.
@@ -139,7 +179,7 @@ def step(
     params = default_params(frameskip) if params is None else params
     check_params(params, frameskip)
     check_share("kinematic_factor", kinematic_factor)
-    action = checks.integer("action", action, 0, len(params.torque_table) - 1)
+    action = checks.decision(action, len(params.torque_table), actions)
     quaternion = checks.unit_quaternion("quaternion", state.quaternion)
     angular_velocity = checks.real("angular_velocity", state.angular_velocity, (3,))
     moving = quaternion, angular_velocity, applied_torque(action, params), params.inertia

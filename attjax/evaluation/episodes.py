@@ -10,8 +10,9 @@ from flax import struct
 
 from attjax.dynamics import numerics
 from attjax.dynamics import quaternion as quaternions
-from attjax.envs.attitude import AttitudeEnv, observation_key, steps_key
+from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
+from attjax.envs.keys import observation_key, steps_key
 from attjax.envs.simulator import EnvParams, EnvState
 from attjax.values import integer
 

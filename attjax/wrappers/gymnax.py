@@ -16,6 +16,7 @@ from gymnax.environments import environment, spaces
 
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.simulator import EnvParams, EnvState
+from attjax.envs.spaces import Discrete
 
 
 class GymnaxEnv(environment.Environment):
@@ -102,9 +103,12 @@ class GymnaxEnv(environment.Environment):
         box = self.attitude_env.observation_space(params)
         return spaces.Box(box.low, box.high, box.shape, box.dtype)
 
-    def action_space(self, params: EnvParams | None = None) -> spaces.Discrete:
+    def action_space(self, params: EnvParams | None = None) -> spaces.Discrete | spaces.Box:
         """The environment's, of gymnax's class."""
-        return spaces.Discrete(self.attitude_env.action_space(params).n)
+        space = self.attitude_env.action_space(params)
+        if isinstance(space, Discrete):
+            return spaces.Discrete(space.n)
+        return spaces.Box(space.low, space.high, space.shape, space.dtype)
 
 
 class FiveValueEnv(GymnaxEnv):

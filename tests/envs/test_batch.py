@@ -9,6 +9,8 @@ from attjax import AttitudeEnv
 from attjax.envs import batch
 
 ENV = AttitudeEnv(frameskip=5)
+CONTINUOUS = AttitudeEnv(frameskip=5, actions="continuous")
+INERTIA = np.array([0.872, 0.115, 0.797])
 
 
 def fleet(count, max_steps=1750):
@@ -75,3 +77,35 @@ def test_open_loop_restarts_and_counts_episodes():
     final, _, totals = batch.open_loop(ENV, params, jax.random.key(4), states, actions)
     assert set(np.asarray(totals.episodes)) == {2}
     assert set(np.asarray(final.time)) == {2}
+
+
+def three_axes(steps, count):
+    """Continuous actions, and the momenta that they leave a spacecraft with that is at rest."""
+    actions = jax.random.uniform(jax.random.key(3), (steps, count, 3), minval=-1, maxval=1)
+    return actions, 0.5 / 240 * np.asarray(actions).sum(0)
+
+
+@pytest.mark.parametrize("num_devices", [1, 2])
+def test_open_loop_takes_torques_about_three_axes(num_devices):
+    params, states = fleet(32)
+    actions, momenta = three_axes(20, 32)
+    expected, reward = states, 0.0
+    step = jax.jit(batch.step, static_argnums=0)
+    for action in actions:
+        _, expected, r, _, _, _ = step(CONTINUOUS, params, jax.random.key(0), expected, action)
+        reward += r
+    np.testing.assert_allclose(INERTIA * expected.angular_velocity, momenta, atol=1e-3)
+    final, observation, totals = batch.open_loop(
+        CONTINUOUS, params, jax.random.key(4), states, actions, num_devices=num_devices
+    )
+    np.testing.assert_allclose(final.quaternion, expected.quaternion, atol=1e-5)
+    np.testing.assert_allclose(observation[:, 8:], expected.angular_velocity, atol=1e-5)
+    np.testing.assert_allclose(totals.reward, reward, atol=1e-3)
+
+
+def test_blocks_keep_the_torques_with_their_spacecraft(monkeypatch):
+    monkeypatch.setattr(batch, "CPU_BLOCK", 8)
+    params, states = fleet(24)
+    actions, momenta = three_axes(2, 24)
+    final, _, _ = batch.open_loop(CONTINUOUS, params, jax.random.key(4), states, actions)
+    np.testing.assert_allclose(INERTIA * final.angular_velocity, momenta, atol=2e-5)

@@ -12,7 +12,12 @@ LEARNING = [
     "tests/ppo/test_losses.py",
     "tests/envs/test_batch.py",
 ]
-DESCENT = ["tests/ppo/test_descent.py", "tests/ppo/test_losses.py", "tests/ppo/test_rollout.py"]
+DESCENT = [
+    "tests/ppo/test_descent.py",
+    "tests/ppo/test_minibatches.py",
+    "tests/ppo/test_losses.py",
+    "tests/ppo/test_rollout.py",
+]
 RUNS = [
     "tests/runs/test_checkpoint.py",
     "tests/runs/test_folder.py",

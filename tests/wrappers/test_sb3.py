@@ -9,7 +9,7 @@ stable_baselines3 = pytest.importorskip("stable_baselines3")
 import torch  # noqa: E402
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecVideoRecorder  # noqa: E402
 
-from attjax.wrappers.gymnasium import ID  # noqa: E402
+from attjax.wrappers.gymnasium import CONTINUOUS_ID, ID  # noqa: E402
 from attjax.wrappers.sb3 import as_vec_env  # noqa: E402
 
 
@@ -172,3 +172,17 @@ def test_ppo_learns():
     print(f"SB3: {model.num_timesteps} steps, return {before:.1f} before, {after:.1f} after")
     assert model.num_timesteps >= 50_000
     assert after > before + 120
+
+
+def test_td3_takes_continuous_actions():
+    vec_env = as_vec_env(gymnasium.make_vec(CONTINUOUS_ID, num_envs=4, max_episode_steps=6), 0.01)
+    assert vec_env.action_space == gymnasium.spaces.Box(-1, 1, (3,), np.float32)
+    model = stable_baselines3.TD3(
+        "MlpPolicy", vec_env, learning_starts=8, batch_size=8, train_freq=1, seed=0, device="cpu"
+    )
+    model.learn(64)
+    assert model.num_timesteps == 64 and model.replay_buffer.pos == 16
+    stored = model.replay_buffer.actions[:16]
+    assert stored.shape == (16, 4, 3) and np.all(np.abs(stored) <= 1) and np.ptp(stored) > 1
+    action, _ = model.predict(vec_env.reset(), deterministic=True)
+    assert action.shape == (4, 3) and action.dtype == np.float32

@@ -8,7 +8,8 @@ import gymnasium
 import numpy as np
 
 from attjax import checks
-from attjax.envs.attitude import AttitudeEnv, steps_key
+from attjax.envs.attitude import AttitudeEnv
+from attjax.envs.keys import steps_key
 from attjax.envs.reward import Transition
 from attjax.envs.simulator import EnvParams
 from attjax.values import integer
@@ -21,13 +22,14 @@ from attjax.wrappers.gymnasium.task import (
     random_key,
 )
 
-ID = "attjax/Slew-v0"
+ID, CONTINUOUS_ID = "attjax/Slew-v0", "attjax/SlewContinuous-v0"
 
 
 class SlewEnv(Task, gymnasium.Env):
     """One spacecraft on one slew after another.
 
-    Observations are Eq. 11, (11,) float32; actions are rows of Table 1. ``info`` holds NumPy
+    Observations are Eq. 11, (11,) float32; actions are rows of Table 1, or continuous, (3,)
+    fractions of the largest torque about each body axis, clipped to [−1, 1]. ``info`` holds NumPy
     scalars that describe the spacecraft after the step: ``score``, the reward of Eq. 12–13,
     ``success_rate`` and ``overspeed_rate``, 0 or 1, ``terminal_error_deg``, and ``is_success``, the
     success rate by the name that Stable-Baselines3 logs.
@@ -43,6 +45,7 @@ class SlewEnv(Task, gymnasium.Env):
         params: :class:`attjax.EnvParams` of one's own spacecraft; by default the paper's.
         render_mode: None, or "rgb_array" for pictures, which need the extra ``plot``.
         rate_margin: fraction of the rate limit that :meth:`action_masks` keeps.
+        actions: "discrete" or "continuous"; by default those of ``env``, or discrete.
 
     Raises:
         ValueError: an argument is not as said.
@@ -56,7 +59,6 @@ class SlewEnv(Task, gymnasium.Env):
     """
 
     metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012 (Gymnasium's way)
-    action_space: gymnasium.spaces.Discrete
 
     def __init__(
         self,
@@ -66,8 +68,9 @@ class SlewEnv(Task, gymnasium.Env):
         params: EnvParams | None = None,
         render_mode: str | None = None,
         rate_margin: float = 0.99,
+        actions: str | None = None,
     ):
-        self._set_task(Options(frameskip, reward, env, params, render_mode, rate_margin))
+        self._set_task(Options(frameskip, reward, env, params, render_mode, rate_margin, actions))
         self._own_limit = int(self._params.max_steps_in_episode)
         self.observation_space, self.action_space = self._spaces()
 
@@ -98,17 +101,21 @@ class SlewEnv(Task, gymnasium.Env):
         """One agent step.
 
         Args:
-            action: an integer of the space, or an array that holds one.
+            action: an integer of the space, or an array that holds one; (3,) real numbers where
+                actions are continuous.
 
         Returns:
             Observation (11,), reward, terminated, truncated, info.
 
         Raises:
-            ValueError: the action is no integer of the space.
+            ValueError: the action is no integer of the space, or no three finite numbers.
             gymnasium.error.ResetNeeded: there was no reset yet.
         """
         self._check_reset()
-        action = checks.action(action, int(self.action_space.n))
+        if isinstance(self.action_space, gymnasium.spaces.Discrete):
+            action = checks.action(action, int(self.action_space.n))
+        else:
+            action = checks.fractions("action", action, (3,))
         self._state, (observation, reward, terminated, truncated, info) = compiled.step(
             self._env, self._params, self._steps_key, self._state, action
         )
@@ -123,6 +130,7 @@ class SlewEnv(Task, gymnasium.Env):
         limit; the name is the one that MaskablePPO of sb3-contrib looks for.
 
         Raises:
+            ValueError: actions are continuous.
             gymnasium.error.ResetNeeded: there was no reset yet.
         """
         return self._masks()

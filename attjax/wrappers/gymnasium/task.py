@@ -26,6 +26,7 @@ from attjax.control import assurance
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.reward import REWARDS, Transition
 from attjax.envs.simulator import EnvParams, EnvState
+from attjax.envs.spaces import Discrete
 
 if TYPE_CHECKING:
     from attjax.wrappers.rendering import Renderer
@@ -58,6 +59,7 @@ class Options:
     params: EnvParams | None = None
     render_mode: str | None = None
     rate_margin: float = 0.99
+    actions: str | None = None
 
     def __post_init__(self):
         reward, margin = self.reward, self.rate_margin
@@ -68,6 +70,8 @@ class Options:
             raise ValueError(f"render_mode is {self.render_mode!r}; it must be None or 'rgb_array'")
         if not (isinstance(margin, numbers.Real) and 0 < margin <= 1):
             raise ValueError(f"rate_margin is {margin!r}; it must be above 0 and at most 1")
+        if self.env is not None and self.actions not in (None, self.env.actions):
+            raise ValueError(f"actions is {self.actions!r}; env has {self.env.actions!r} ones")
 
 
 class Task:
@@ -84,7 +88,8 @@ class Task:
         if env is None:
             reward = options.reward
             reward = REWARDS[reward] if isinstance(reward, str) else reward
-            env = AttitudeEnv(options.frameskip, reward=reward)
+            actions = "discrete" if options.actions is None else options.actions
+            env = AttitudeEnv(options.frameskip, reward=reward, actions=actions)
         self._env = env
         self._params = env.default_params if options.params is None else options.params
         self._set_limit(limit)
@@ -120,7 +125,11 @@ class Task:
         low, high = (
             np.asarray(x, np.float32) * np.float32(1 + ROUNDING) for x in (box.low, box.high)
         )
-        return spaces.Box(low, high), spaces.Discrete(self._env.action_space(self._params).n)
+        observation_space, actions = spaces.Box(low, high), self._env.action_space(self._params)
+        if isinstance(actions, Discrete):
+            return observation_space, spaces.Discrete(actions.n)
+        one = np.ones(actions.shape, np.float32)
+        return observation_space, spaces.Box(-one, one)
 
     def _check_reset(self):
         check_not_forked()
@@ -129,6 +138,8 @@ class Task:
 
     def _masks(self):
         """(num_envs, actions) bool, or (actions,) of one spacecraft."""
+        if self._env.actions == "continuous":
+            raise ValueError("action_masks: continuous actions have none")
         self._check_reset()
         return np.array(_allowed(self._env, self._params, self._state, self._rate_margin))
 

@@ -34,8 +34,8 @@ class SlewVectorEnv(Task, VectorEnv):
         num_envs: spacecraft.
         max_episode_steps: time limit, agent steps; None leaves the task's.
         autoreset_mode: a ``gymnasium.vector.AutoresetMode`` or its value, as "NextStep".
-        options: ``frameskip``, ``reward``, ``env``, ``params``, ``render_mode`` and
-            ``rate_margin``, as :class:`attjax.wrappers.gymnasium.SlewEnv`; the same for all.
+        options: ``frameskip``, ``reward``, ``env``, ``params``, ``render_mode``, ``rate_margin``
+            and ``actions``, as :class:`attjax.wrappers.gymnasium.SlewEnv`; the same for all.
 
     Raises:
         ValueError: an argument is not as said.
@@ -52,7 +52,6 @@ class SlewVectorEnv(Task, VectorEnv):
         "render_modes": ["rgb_array"],
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }
-    single_action_space: spaces.Discrete
     _key: chex.PRNGKey
     _observations: chex.Array
     _ended: np.ndarray
@@ -109,19 +108,23 @@ class SlewVectorEnv(Task, VectorEnv):
         """One agent step of all spacecraft.
 
         Args:
-            actions: (num_envs,) integers, rows of Table 1.
+            actions: (num_envs,) integers, rows of Table 1; (num_envs, 3) real numbers where they
+                are continuous.
 
         Returns:
             Observations (num_envs, 11); rewards, terminated and truncated, each (num_envs,);
             info.
 
         Raises:
-            ValueError: the actions are no such integers; with autoreset mode DISABLED, an episode
+            ValueError: the actions are no such array; with autoreset mode DISABLED, an episode
                 ended and was not reset.
             gymnasium.error.ResetNeeded: there was no reset yet.
         """
         self._check_reset()
-        actions = checks.actions(actions, self.num_envs, int(self.single_action_space.n))
+        if isinstance(self.single_action_space, spaces.Discrete):
+            actions = checks.actions(actions, self.num_envs, int(self.single_action_space.n))
+        else:
+            actions = checks.fractions("actions", actions, (self.num_envs, 3))
         inputs = self._env, self._params, self._key, self._state, actions
         if self.autoreset_mode == AutoresetMode.SAME_STEP:
             self._key, self._state, results = compiled.step_batch(*inputs)
