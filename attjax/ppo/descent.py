@@ -1,8 +1,6 @@
 """The gradient steps of an update: shuffled minibatches, the clipped loss, Adam."""
 
-import functools
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import chex
@@ -12,17 +10,13 @@ import optax
 from flax import struct
 from jax.flatten_util import ravel_pytree
 
+from attjax.config.settings import PPO
 from attjax.ppo import losses
 from attjax.ppo.networks import Inputs, Policy
-from attjax.ppo.train_state import Learner, Setup, entropy_coefficient, optimizer
+from attjax.ppo.train_state import Learner, entropy_coefficient, optimizer
 from attjax.sharding import AXIS
 
 MAX_INDEX_BITS = 18
-
-NETWORKS = ("policy", "value")
-METRICS = (
-    "policy_loss", "value_loss", "entropy", "explained_variance", "approximate_kl", "clip_fraction",
-)  # fmt: skip
 
 SHUFFLED_TOGETHER = 8
 """Most neighbouring spacecraft whose samples stay together in a shuffle."""
@@ -39,63 +33,18 @@ class Sample:
     target: chex.Array
 
 
-def optimize(setup: Setup, learner: Learner, samples: Sample) -> tuple[Learner, dict]:
+def optimize(
+    policy: Policy, settings: PPO, learner: Learner, samples: Sample, num_devices: int
+) -> tuple[Learner, dict]:
     """N passes of shuffled minibatches. Returns the learner and the losses' means.
 
-    Each device shuffles its own samples; a minibatch takes the same number of each device's. Where
-    ``setup.splits_networks``, one device trains the policy and the other the value network, each
-    on all samples, without a word between them: minibatches too small to be worth sharing.
-    """
-    key, pass_key = jax.random.split(learner.key)
-    pass_key = jax.random.fold_in(pass_key, jax.lax.axis_index(AXIS))
-    pass_keys = jax.random.split(pass_key, setup.settings.ppo.passes)
-    learner = learner.replace(key=key)
-    if not setup.splits_networks:
-        return _descend(setup, Work(NETWORKS, _mean_of_devices), learner, samples, pass_keys)
-    samples = jax.tree.map(lambda x: jax.lax.all_gather(x, AXIS, tiled=True), samples)
-    owner = {name: jax.lax.axis_index(AXIS) == i for i, name in enumerate(NETWORKS)}
-    trained, metrics = jax.lax.cond(
-        owner["policy"],
-        functools.partial(_descend, setup, Work(("policy",))),
-        functools.partial(_descend, setup, Work(("value",))),
-        *(learner, samples, pass_keys),
-    )
-    params, state = (
-        {name: _from_its_owner(owner[name], part[name]) for name in NETWORKS}
-        for part in (trained.params, trained.optimizer)
-    )
-    return learner.replace(params=params, optimizer=state), jax.lax.psum(metrics, AXIS)
-
-
-def _from_its_owner(is_owner, tree):
-    """What the device that it is true of has there, on all devices."""
-    return jax.tree.map(lambda x: jax.lax.psum(jnp.where(is_owner, x, 0), AXIS), tree)
-
-
-def _mean_of_devices(tree):
-    """Of all devices, in a single exchange."""
-    vector, restore = ravel_pytree(tree)
-    return restore(jax.lax.pmean(vector, AXIS))
-
-
-class Work(NamedTuple):
-    """A device's part of the gradient steps: which networks, and how devices that share a
-    minibatch make one number of theirs.
-    """
-
-    networks: tuple[str, ...]
-    mean: Callable = lambda tree: tree
-
-
-def _descend(setup, work, learner, samples, pass_keys):
-    """The passes over a device's samples for some networks, and their metrics, 0 for the others.
-
+    Each device shuffles its own samples; a minibatch takes the same number of each device's.
     What is shuffled are blocks of neighbours, up to SHUFFLED_TOGETHER spacecraft at one time:
     samples independent of each other that memory gives four times as fast as single ones.
     """
-    settings, adam = setup.settings.ppo, optimizer(setup.settings.ppo)
-    size = settings.minibatch_size // (1 if setup.splits_networks else setup.num_devices)
-    block = math.gcd(setup.envs_per_device, size, SHUFFLED_TOGETHER)
+    adam = optimizer(settings)
+    per_device = settings.minibatch_size // num_devices
+    block = math.gcd(settings.num_envs // num_devices, per_device, SHUFFLED_TOGETHER)
     num_blocks = len(samples.action) // block
     weights = LossWeights(settings.clip, entropy_coefficient(settings, learner.update))
 
@@ -105,24 +54,26 @@ def _descend(setup, work, learner, samples, pass_keys):
         sample = jax.tree.map(lambda x: take_blocks(x, num_blocks, chosen), samples)
         sample = sample.replace(advantage=advantage)
         gradients, metrics = jax.grad(loss, argnums=1, has_aux=True)(
-            setup.policy, params, sample, weights
+            policy, params, sample, weights
         )
-        return _gradient_step(adam, params, state, work.mean(gradients)), metrics
+        return _descend(adam, params, state, gradients), metrics
 
     def one_pass(carry, key):
-        used = settings.minibatches * (size // block)
+        used = settings.minibatches * (per_device // block)
         order = random_order(key, num_blocks)[:used].reshape(settings.minibatches, -1)
         advantage = take_blocks(samples.advantage, num_blocks, order)
         advantage = advantage.reshape(settings.minibatches, -1)
         if settings.normalize_advantage:
-            advantage = losses.standardize(advantage, lambda x: work.mean(_row_means(x)))
+            advantage = losses.standardize(advantage, _minibatch_means)
         return jax.lax.scan(gradient_step, carry, (order, advantage))
 
-    start = [{x: tree[x] for x in work.networks} for tree in (learner.params, learner.optimizer)]
-    (params, state), metrics = jax.lax.scan(one_pass, tuple(start), pass_keys)
-    metrics = {name: jnp.mean(metrics[name]) if name in metrics else 0.0 for name in METRICS}
-    params, state = learner.params | params, learner.optimizer | state
-    return learner.replace(params=params, optimizer=state), metrics
+    key, pass_key = jax.random.split(learner.key)
+    pass_key = jax.random.fold_in(pass_key, jax.lax.axis_index(AXIS))
+    pass_keys = jax.random.split(pass_key, settings.passes)
+    start = learner.params, learner.optimizer
+    (params, state), metrics = jax.lax.scan(one_pass, start, pass_keys)
+    learner = learner.replace(params=params, optimizer=state, key=key)
+    return learner, jax.tree.map(jnp.mean, metrics)
 
 
 def take_blocks(x: chex.Array, num_blocks: int, chosen: chex.Array) -> chex.Array:
@@ -147,17 +98,19 @@ def random_order(key: chex.PRNGKey, count: int) -> chex.Array:
     return jnp.sort(words) & index_mask
 
 
-def _row_means(x):
-    """Means over each row of x, a minibatch."""
-    return jnp.mean(x, axis=1, keepdims=True)
+def _minibatch_means(x):
+    """Means over each row of x, a minibatch, and over the devices that share it."""
+    return jax.lax.pmean(jnp.mean(x, axis=1, keepdims=True), AXIS)
 
 
-def _gradient_step(transformation, params, state, gradients):
-    """The optimizer's step, for each network along its gradient as one vector."""
+def _descend(transformation, params, state, gradients):
+    """The optimizer's step along the gradients' mean over the devices, in a single exchange."""
+    vectors = {name: ravel_pytree(tree)[0] for name, tree in gradients.items()}
+    joined, part = ravel_pytree(vectors)
+    vectors = part(jax.lax.pmean(joined, AXIS))
     moved, states = {}, {}
     for name, tree in params.items():
-        vector, _ = ravel_pytree(gradients[name])
-        move, states[name] = transformation.update(vector, state[name])
+        move, states[name] = transformation.update(vectors[name], state[name])
         _, restore = ravel_pytree(tree)
         moved[name] = optax.apply_updates(tree, restore(move))
     return moved, states
@@ -173,40 +126,25 @@ class LossWeights(NamedTuple):
 def loss(
     policy: Policy, params: dict, sample: Sample, weights: LossWeights
 ) -> tuple[chex.Array, dict[str, Any]]:
-    """The sum of the losses of those networks that there are parameters of, and METRICS of them.
+    """Clipped objective with entropy bonus plus the value's mean squared error.
 
     The two networks share no parameters, so the sum trains each on its own loss.
     """
-    total, metrics = jnp.zeros(()), dict[str, Any]()
-    for name, loss_of in (("policy", policy_loss), ("value", value_loss)):
-        if name in params:
-            of_network, more = loss_of(policy, params, sample, weights)
-            total, metrics = total + of_network, metrics | more
-    return total, metrics
-
-
-def policy_loss(
-    policy: Policy, params: dict, sample: Sample, weights: LossWeights
-) -> tuple[chex.Array, dict[str, Any]]:
-    """Clipped objective (Eq. 4) with entropy bonus, and its metrics."""
     log_probabilities = policy.log_probabilities(params, sample.inputs)
-    clipped, diagnostics = losses.clipped_policy_loss(
+    policy_loss, diagnostics = losses.clipped_policy_loss(
         losses.pick(log_probabilities, sample.action),
         sample.log_probability,
         sample.advantage,
         weights.clip,
     )
     entropy = jnp.mean(losses.entropy(log_probabilities))
-    metrics = {"policy_loss": clipped, "entropy": entropy, **diagnostics}
-    return clipped - weights.entropy * entropy, metrics
-
-
-def value_loss(
-    policy: Policy, params: dict, sample: Sample, weights: LossWeights
-) -> tuple[chex.Array, dict[str, Any]]:
-    """Mean squared error of V(s), and its metrics."""
-    del weights
     residual = policy.value(params, sample.inputs.features) - sample.target
-    squared = jnp.mean(residual**2)
-    explained = 1 - jnp.var(residual) / (jnp.var(sample.target) + 1e-12)
-    return squared, {"value_loss": squared, "explained_variance": explained}
+    value_loss = jnp.mean(residual**2)
+    metrics = {
+        "policy_loss": policy_loss,
+        "value_loss": value_loss,
+        "entropy": entropy,
+        "explained_variance": 1 - jnp.var(residual) / (jnp.var(sample.target) + 1e-12),
+        **diagnostics,
+    }
+    return policy_loss - weights.entropy * entropy + value_loss, metrics

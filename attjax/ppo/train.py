@@ -75,7 +75,9 @@ def update(
     """
     learner, steps = rollout(setup, env_params, learner)
     samples = with_advantages(setup, env_params, learner, steps)
-    learner, losses_ = optimize(setup, learner, samples)
+    learner, losses_ = optimize(
+        setup.policy, setup.settings.ppo, learner, samples, setup.num_devices
+    )
     not_finite = {
         "observations": _any_not_finite(steps.inputs.features),
         "rewards": _any_not_finite(steps.reward),

@@ -32,12 +32,9 @@ class Setup:
         groups: of spacecraft, equal in number, that the metrics are told apart by.
         num_devices: devices, or CPU cores as devices, that share the spacecraft and each
             minibatch; a divisor of the numbers of both.
-        splits_networks: whether the devices, two of them, do not share minibatches but each train
-            a network.
 
     Raises:
-        ValueError: a device has fewer spacecraft than there are groups, or it is not two devices
-            that split the networks.
+        ValueError: a device has fewer spacecraft than there are groups.
     """
 
     env: Any
@@ -45,11 +42,8 @@ class Setup:
     settings: Settings
     groups: int = 1
     num_devices: int = 1
-    splits_networks: bool = False
 
     def __post_init__(self):
-        if self.splits_networks and self.num_devices != 2:
-            raise ValueError(f"num_devices is {self.num_devices}; to split the networks it is 2")
         if self.envs_per_device < self.groups:
             raise ValueError(
                 f"num_devices is {self.num_devices}, for {self.envs_per_device} spacecraft each; "

@@ -60,12 +60,7 @@ def rules(task: Task) -> dict[str, Any]:
     return {name: getattr(task, name) for name in names}
 
 
-def setup(
-    settings: Settings,
-    craft: Spacecraft = LM50,
-    num_devices: int = 1,
-    splits_networks: bool = False,
-) -> train_state.Setup:
+def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) -> train_state.Setup:
     """Environment, policy and settings of a training run.
 
     Raises:
@@ -88,8 +83,7 @@ def setup(
     if settings.network.rate_margin > 0:
         _check_that_torques_are_left(settings, craft)
     groups = len(settings.task.frameskips)
-    flies = policy(settings, craft)
-    return train_state.Setup(env, flies, settings, groups, num_devices, splits_networks)
+    return train_state.Setup(env, policy(settings, craft), settings, groups, num_devices)
 
 
 def of_config(config: Config) -> train_state.Setup:
@@ -98,10 +92,7 @@ def of_config(config: Config) -> train_state.Setup:
     Raises:
         FunctionError, UserValueError: as :func:`setup`.
     """
-    settings = config.settings
-    if can_split_networks(settings):
-        return setup(settings, config.spacecraft, 2, splits_networks=True)
-    return setup(settings, config.spacecraft, num_devices(settings))
+    return setup(config.settings, config.spacecraft, num_devices(config.settings))
 
 
 def _check_that_torques_are_left(settings, craft):
@@ -140,13 +131,6 @@ def num_devices(settings: Settings) -> int:
         settings.ppo.num_envs // len(settings.task.frameskips),
     )
     return max(n for n in range(1, shared + 1) if shared % n == 0 and n <= most)
-
-
-def can_split_networks(settings: Settings) -> bool:
-    """Whether a device for each network is the way to use two: minibatches too small to share."""
-    per_device, odd = divmod(settings.ppo.num_envs, 2)
-    enough = not odd and per_device >= len(settings.task.frameskips)
-    return enough and len(jax.devices()) > 1 and settings.ppo.minibatch_size < 2 * MIN_SAMPLES
 
 
 def env_params(setup: train_state.Setup) -> simulator.EnvParams:

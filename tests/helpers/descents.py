@@ -1,7 +1,6 @@
 """An update's gradient steps for tests: small setups, random samples, and a run of them."""
 
 import dataclasses
-import functools
 
 import jax
 import jax.numpy as jnp
@@ -23,11 +22,6 @@ def small_setup(num_devices=1, **overrides):
     overrides = sizes | {"frameskips": (20,), "features": "state", "rate_margin": 0.0} | overrides
     setup = small_attitude_setup(3, **overrides)
     return dataclasses.replace(setup, num_devices=num_devices)
-
-
-def split_setup(**overrides):
-    """The same, a device for each network."""
-    return dataclasses.replace(small_setup(2, **overrides), splits_networks=True)
 
 
 def random_samples(count):
@@ -78,7 +72,9 @@ def optimized(setup, samples, update=0):
     specs = (train_state.LEARNER_SPECS, sharding.SPLIT)
     run = sharding.on_devices(
         setup.num_devices,
-        functools.partial(descent.optimize, setup),
+        lambda before, samples: descent.optimize(
+            setup.policy, setup.settings.ppo, before, samples, setup.num_devices
+        ),
         specs,
         (train_state.LEARNER_SPECS, PartitionSpec()),
     )

@@ -18,11 +18,6 @@ DESCENT = [
     "tests/ppo/test_losses.py",
     "tests/ppo/test_rollout.py",
 ]
-    "tests/ppo/test_descent.py",
-    "tests/ppo/test_minibatches.py",
-    "tests/ppo/test_losses.py",
-    "tests/ppo/test_rollout.py",
-]
 RUNS = [
     "tests/runs/test_checkpoint.py",
     "tests/runs/test_folder.py",

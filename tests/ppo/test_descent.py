@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from descents import new_learner, optimized, random_samples, small_setup, split_setup
+from descents import new_learner, optimized, random_samples, small_setup
 from jax.flatten_util import ravel_pytree
 
 from attjax.ppo import descent
@@ -37,11 +37,10 @@ def written_out_loss(params, samples, advantage, clip, entropy_weight):
     return -gain - entropy_weight * entropy + jnp.mean(miss**2), metrics
 
 
-@pytest.mark.parametrize("make_setup", [small_setup, split_setup])
 @pytest.mark.parametrize("normalize, max_norm", [(True, 0.05), (False, 0.0)])
-def test_a_gradient_step_is_adams_along_the_loss_written_out(x64, make_setup, normalize, max_norm):
+def test_a_gradient_step_is_adams_along_the_loss_written_out(x64, normalize, max_norm):
     """All samples in one minibatch; Adam's first moment is a tenth of the gradient, clipped."""
-    setup = make_setup(
+    setup = small_setup(
         minibatch_size=128,
         passes=1,
         normalize_advantage=normalize,

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from descents import optimized, random_samples, small_setup, split_setup
+from descents import optimized, random_samples, small_setup
 
 from attjax import sharding
 from attjax.ppo import descent
@@ -72,19 +72,6 @@ def test_samples_beyond_whole_minibatches_sit_a_pass_out(monkeypatch, num_device
     assert [len(x) for _, x, _ in taken] == [48 // num_devices] * 8 * num_devices
     times = np.bincount(np.concatenate([x for _, x, _ in taken]), minlength=128)
     assert times.sum() == 4 * 96 and times.max() <= 4 and len(set(times)) > 1
-
-
-def test_a_device_for_each_network_gives_it_all_samples(monkeypatch):
-    """Whole minibatches of its own order, of the spacecraft of both."""
-    setup = split_setup(num_envs=16, rollout_length=64, minibatch_size=64, passes=3)
-    taken, _ = minibatches(monkeypatch, setup, 1024)
-    for device in (0, 1):
-        numbers = [x for of, x, _ in taken if of == device]
-        assert len(numbers) == 3 * 16 and {len(x) for x in numbers} == {64}
-        np.testing.assert_array_equal(np.bincount(np.concatenate(numbers)), np.full(1024, 3))
-        assert sum(len(set(x // 512)) == 2 for x in numbers) > 40
-    orders = [np.concatenate([x for of, x, _ in taken if of == device]) for device in (0, 1)]
-    assert np.mean(orders[0] == orders[1]) < 0.1
 
 
 @pytest.mark.parametrize("num_devices", [1, 2])

@@ -11,7 +11,6 @@ from setups import fly, settings, small_attitude_setup
 
 from attjax import AttitudeEnv, ppo, sharding
 from attjax.config import presets
-from attjax.config import run as run_config
 from attjax.ppo import descent, train_state
 from attjax.ppo.networks import Policy
 from attjax.runs import build
@@ -22,9 +21,11 @@ def train(setup, env_params):
     return ppo.train_block(setup, env_params, state, setup.settings.ppo.num_updates)
 
 
-def train_probe(probe, devices=None, updates=60, **overrides):
+def train_probe(probe, updates=60, num_devices=1, **overrides):
     policy = Policy(hidden_sizes=(32, 32), num_actions=2)
-    setup = train_state.Setup(probe, policy, settings(updates, **overrides), **(devices or {}))
+    setup = train_state.Setup(
+        probe, policy, settings(updates, **overrides), num_devices=num_devices
+    )
     state, _ = train(setup, probe.default_params)
 
     def value(*observation):
@@ -42,9 +43,8 @@ def test_value_of_a_constant_reward():
     assert value(1, 0) == pytest.approx(1, abs=0.05)
 
 
-@pytest.mark.parametrize("devices", [None, {"num_devices": 2, "splits_networks": True}])
-def test_value_that_depends_on_the_observation(devices):
-    value, _ = train_probe(Probe("sign"), devices)
+def test_value_that_depends_on_the_observation():
+    value, _ = train_probe(Probe("sign"))
     assert value(1, 0) == pytest.approx(1, abs=0.05)
     assert value(-1, 0) == pytest.approx(-1, abs=0.05)
 
@@ -55,10 +55,9 @@ def test_value_of_a_delayed_reward_is_discounted():
         assert value(1, step / 3) == pytest.approx(0.8 ** (2 - step), abs=0.07)
 
 
-@pytest.mark.parametrize("num_devices, splits_networks", [(1, False), (2, False), (2, True)])
-def test_actions_follow_the_advantage(num_devices, splits_networks):
-    devices = {"num_devices": num_devices, "splits_networks": splits_networks}
-    _, probability = train_probe(Probe("match"), devices)
+@pytest.mark.parametrize("num_devices", [1, 2])
+def test_actions_follow_the_advantage(num_devices):
+    _, probability = train_probe(Probe("match"), num_devices=num_devices)
     assert probability(1, 1, 0) > 0.95
     assert probability(0, -1, 0) > 0.95
 
@@ -188,15 +187,12 @@ def test_two_devices_take_the_gradient_step_of_one():
     _, steps = fly(one, env_params, train_state.init(one, env_params, jax.random.key(0)))
     steps = jax.tree.map(np.asarray, steps)
     results = []
-    for num_devices, splits_networks in ((1, False), (2, False), (2, True)):
-        setup = dataclasses.replace(one, num_devices=num_devices, splits_networks=splits_networks)
+    for num_devices in (1, 2):
+        setup = dataclasses.replace(one, num_devices=num_devices)
         state = train_state.init(setup, env_params, jax.random.key(0))
         optimize = functools.partial(on_samples, setup, env_params, state)
         results.append(jax.jit(optimize)(steps))
-    for other in results[1:]:
-        jax.tree.map(
-            lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-3, atol=1e-7), results[0], other
-        )
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-3, atol=1e-7), *results)
 
 
 def on_samples(setup, env_params, state, steps):
@@ -204,7 +200,9 @@ def on_samples(setup, env_params, state, steps):
 
     def on_device(state, steps):
         samples = ppo.with_advantages(setup, env_params, state, steps)
-        return descent.optimize(setup, state, samples)[0].optimizer
+        return descent.optimize(
+            setup.policy, setup.settings.ppo, state, samples, setup.num_devices
+        )[0].optimizer
 
     split = PartitionSpec(None, sharding.AXIS)
     specs = (train_state.LEARNER_SPECS, split)
@@ -216,15 +214,3 @@ def test_small_minibatches_are_not_shared_out():
     assert build.num_devices(presets.PRECISE) == 2
     assert build.num_devices(presets.PAPER_FAST) == 1
     assert build.num_devices(presets.PRECISE.replace(num_envs=2047)) == 1
-
-
-def test_small_minibatches_leave_a_device_to_each_network():
-    of = {name: build.of_config(run_config.new(name)) for name in presets.PRESETS}
-    assert {name: x.splits_networks for name, x in of.items()} == {
-        name: name != "precise" for name in presets.PRESETS
-    }
-    assert {x.num_devices for x in of.values()} == {2}
-    odd = build.of_config(run_config.new("paper", num_envs=31))
-    assert (odd.num_devices, odd.splits_networks) == (1, False)
-    with pytest.raises(ValueError, match="num_devices is 1; to split the networks it is 2"):
-        dataclasses.replace(of["paper"], num_devices=1)
