@@ -172,7 +172,11 @@ def one_argument(observation): return observation
         ("reward", "mine:integer", "reward mine:integer returned shape () and type int32"),
         ("features", "mine:scalar", "features mine:scalar returned shape () and type float32"),
         ("features", "mine:one_argument", "features mine:one_argument failed: TypeError"),
-        ("reward", "best", "it must be one of paper, logarithmic, or module:function"),
+        (
+            "reward",
+            "best",
+            "it must be one of paper, logarithmic, authors, authors-continuous, or module:function",
+        ),
         ("features", "mine.scalar", "or module:function"),
     ],
 )
