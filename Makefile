@@ -41,7 +41,7 @@ test-peers: $(VENV)-gym/installed $(VENV)-rejax/installed
 	$(VENV)-gym/bin/python -m pytest tests/wrappers/test_gymnasium*.py tests/wrappers/test_rendering.py \
 	    tests/wrappers/test_sb3.py tests/wrappers/test_clients.py tests/test_docs.py::test_python_runs \
 	    attjax/wrappers/gymnasium attjax/wrappers/sb3.py $(ARGS)
-	$(VENV)-rejax/bin/python -m pytest tests/wrappers/test_gymnax.py tests/test_docs.py::test_python_runs \
+	$(VENV)-rejax/bin/python -m pytest tests/wrappers/test_gymnax*.py tests/test_docs.py::test_python_runs \
 	    attjax/wrappers/gymnax.py $(ARGS)
 
 $(VENV)-gym/installed: pyproject.toml
