@@ -32,10 +32,12 @@ class AgentStep(NamedTuple):
     Attributes:
         frameskip: number of RK4 steps after the first.
         held: whether the torque stays on in these steps.
+        kinematic_factor: as in :func:`rk4_step`.
     """
 
     frameskip: int
     held: bool = False
+    kinematic_factor: float = 0.5
 
 
 class Turn(NamedTuple):
@@ -123,14 +125,12 @@ def take(
     torque: Float[Array | np.ndarray, "3"],
     inertia: rigid_body.Inertia,
     steps_after: Real[ArrayLike, ""] | None = None,
-    kinematic_factor: float = 0.5,
 ) -> tuple[Float[Array, "4"], Float[Array, "3"]]:
     """:func:`propagate`, by any kinematics.
 
     Args:
-        agent_step: the frameskip, and whether the torque is held.
+        agent_step: the frameskip, whether the torque is held, and the kinematics.
         quaternion, angular_velocity, torque, inertia, steps_after: as in :func:`propagate`.
-        kinematic_factor: as in :func:`rk4_step`.
 
     Returns:
         As :func:`propagate`.
@@ -138,7 +138,7 @@ def take(
     quaternion, angular_velocity, torque, inertia = _checked(
         quaternion, angular_velocity, torque, inertia
     )
-    equations = EquationsOfMotion.of(inertia, torque, kinematic_factor)
+    equations = EquationsOfMotion.of(inertia, torque, agent_step.kinematic_factor)
     start = RigidState.of(quaternion, angular_velocity)
     limit = None if steps_after is None else jnp.asarray(steps_after, quaternion.dtype)
     change = _change(agent_step, start, equations, limit)

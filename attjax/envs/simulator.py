@@ -184,11 +184,11 @@ def step(
     angular_velocity = checks.real("angular_velocity", state.angular_velocity, (3,))
     moving = quaternion, angular_velocity, applied_torque(action, params), params.inertia
     have_values = all(map(checks.has_value, jax.tree.leaves((moving, params.frameskip))))
-    agent_step = propagation.AgentStep(frameskip, params.torque_held)
+    agent_step = propagation.AgentStep(frameskip, params.torque_held, kinematic_factor)
     take = _compiled_take if have_values else propagation.take
-    quaternion, angular_velocity = take(agent_step, *moving, params.frameskip, kinematic_factor)
+    quaternion, angular_velocity = take(agent_step, *moving, params.frameskip)
     return EnvState(quaternion, angular_velocity, state.time + 1)
 
 
-_compiled_take = jax.jit(propagation.take, static_argnames=("agent_step", "kinematic_factor"))
+_compiled_take = jax.jit(propagation.take, static_argnames="agent_step")
 """For steps outside ``jit`` and ``vmap``, each of which would compile its loops anew."""

@@ -69,7 +69,7 @@ def test_an_agent_step_of_other_kinematics(x64, inertia, held):
 
         def take(q, w, torque, steps):
             return propagation.take(
-                AgentStep(7, held), q, w, torque, jnp.asarray(inertia), steps, 1.0
+                AgentStep(7, held, 1.0), q, w, torque, jnp.asarray(inertia), steps
             )
 
         axes = (0, 0, 0, None if steps_after is None else 0)
