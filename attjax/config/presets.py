@@ -14,6 +14,7 @@ PAPER = Settings(
         stagger_episodes=False,
         kinematic_factor=0.5,
         observes_quaternion_rate=True,
+        actions="discrete",
     ),
     network=Network(
         features="state", hidden_sizes=(400, 300), initial_weights="orthogonal", rate_margin=0.0
@@ -73,6 +74,7 @@ PRECISE = Settings(
         stagger_episodes=True,
         kinematic_factor=0.5,
         observes_quaternion_rate=True,
+        actions="discrete",
     ),
     network=Network(
         features="multiscale", hidden_sizes=(64, 64), initial_weights="orthogonal", rate_margin=0.99

@@ -52,6 +52,11 @@ class Task(Checked):
         high=1,
         before=0.5,
     )
+    actions: str = _task(
+        "choose one of the torques, or any about the three axes at once up to the largest",
+        choices=("discrete", "continuous"),
+        before="discrete",
+    )
     observes_quaternion_rate: bool = _task(
         "observe Eq. 11's rate of the quaternion; otherwise zeros, as in the authors' public code",
         before=True,

@@ -139,6 +139,6 @@ def decide(
     observation = observations.observe(quaternion, angular_velocity)
     inputs = flight.policy.encode(observation, flight.context)
     batch_of_one = jax.tree.map(lambda x: x[None], inputs)
-    logits = flight.policy.logits(flight.params, batch_of_one)[:, 0]
+    logits = flight.policy.outputs(flight.params, batch_of_one)[:, 0]
     action = flight.policy.act(flight.params, observation, flight.context)
     return action.astype(jnp.int32), logits

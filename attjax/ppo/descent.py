@@ -130,14 +130,14 @@ def loss(
 
     The two networks share no parameters, so the sum trains each on its own loss.
     """
-    log_probabilities = policy.log_probabilities(params, sample.inputs)
+    distribution = policy.distribution(params, sample.inputs)
     policy_loss, diagnostics = losses.clipped_policy_loss(
-        losses.pick(log_probabilities, sample.action),
+        distribution.log_probability(sample.action),
         sample.log_probability,
         sample.advantage,
         weights.clip,
     )
-    entropy = jnp.mean(losses.entropy(log_probabilities))
+    entropy = jnp.mean(distribution.entropy())
     residual = policy.value(params, sample.inputs.features) - sample.target
     value_loss = jnp.mean(residual**2)
     metrics = {

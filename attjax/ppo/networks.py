@@ -13,6 +13,7 @@ from attjax.control import assurance
 from attjax.control.features import FEATURES
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
+from attjax.ppo.distributions import Categorical, Gaussian
 
 MASKED_LOGIT = -1e9
 
@@ -23,11 +24,11 @@ class Inputs:
 
     Attributes:
         features: (features,) network input.
-        allowed: (actions,) bool, the actions that are not masked.
+        allowed: (actions,) bool, the actions that are not masked; None of continuous ones.
     """
 
     features: chex.Array
-    allowed: chex.Array
+    allowed: chex.Array | None
 
 
 class Dense(nn.Module):
@@ -82,17 +83,18 @@ class MLP(nn.Module):
 
 @dataclasses.dataclass(frozen=True)
 class Policy:
-    """A categorical policy and its value function, two networks that share no parameters.
+    """A policy and its value function, two networks that share no parameters.
 
     Attributes:
         features: "state", the observation as it is, "multiscale", or a function of an observation
             (size,) and a context, to (features,).
         hidden_sizes: neurons of each hidden layer.
-        num_actions: number of actions.
+        num_actions: how many a categorical policy chooses from.
         rate_margin: the fraction of the rate limit that :func:`attjax.control.assurance.rate_mask`
         keeps;
             0: no mask.
         initial_weights: "orthogonal", or "uniform" up to 1/√inputs with biases, as PyTorch's.
+        actions: "discrete"; or "continuous", a Gaussian over (3,) fractions of the largest torques.
     """
 
     features: str | Callable = "state"
@@ -100,11 +102,18 @@ class Policy:
     num_actions: int = 19
     rate_margin: float = 0.0
     initial_weights: str = "orthogonal"
+    actions: str = "discrete"
+
+    @property
+    def distribution_family(self) -> type[Categorical] | type[Gaussian]:
+        """What its actions are drawn from."""
+        return Gaussian if self.actions == "continuous" else Categorical
 
     @property
     def policy_network(self) -> MLP:
-        """From features to logits."""
-        return MLP(self.hidden_sizes, self.num_actions, 0.01, self.initial_weights)
+        """From features to logits, or to the two parameters of a Gaussian for each axis."""
+        outputs = 6 if self.actions == "continuous" else self.num_actions
+        return MLP(self.hidden_sizes, outputs, 0.01, self.initial_weights)
 
     @property
     def value_network(self) -> MLP:
@@ -130,27 +139,34 @@ class Policy:
         given = self.features
         function = FEATURES[given] if isinstance(given, str) else given
         features = function(observation, context)
+        if self.actions == "continuous":
+            return Inputs(features, None)
         allowed = jnp.ones(self.num_actions, bool)
         if self.rate_margin > 0:
             angular_velocity = observation[observations.ANGULAR_VELOCITY]
             allowed = assurance.rate_mask(context, self.rate_margin).allowed(angular_velocity)
         return Inputs(features, allowed)
 
-    def logits(self, params: dict, inputs: Inputs) -> chex.Array:
-        """(actions, samples) of (samples, ...) inputs, MASKED_LOGIT where masked."""
-        logits: chex.Array = self.policy_network.apply(params["policy"], inputs.features)
-        return jnp.where(inputs.allowed.T, logits, MASKED_LOGIT)
+    def outputs(self, params: dict, inputs: Inputs) -> chex.Array:
+        """(outputs, samples) of (samples, ...) inputs: logits are MASKED_LOGIT where masked."""
+        outputs: chex.Array = self.policy_network.apply(params["policy"], inputs.features)
+        if inputs.allowed is None:
+            return outputs
+        return jnp.where(inputs.allowed.T, outputs, MASKED_LOGIT)
 
-    def log_probabilities(self, params: dict, inputs: Inputs) -> chex.Array:
-        """LogSoftmax over the actions (Table 3), (actions, samples), of (samples, ...) inputs."""
-        return nn.log_softmax(self.logits(params, inputs), axis=0)
+    def distribution(self, params: dict, inputs: Inputs) -> Categorical | Gaussian:
+        """Of the actions, by LogSoftmax (Table 3) or as Gaussian; of (samples, ...) inputs."""
+        outputs = self.outputs(params, inputs)
+        if self.actions == "continuous":
+            return Gaussian.of(outputs)
+        return Categorical(nn.log_softmax(outputs, axis=0))
 
     def value(self, params: dict, features: chex.Array) -> chex.Array:
         """(samples,) V(s) of (samples, features)."""
         return self.value_network.apply(params["value"], features)[0]
 
     def act(self, params: dict, observation: chex.Array, context: Context) -> chex.Array:
-        """The most probable action for one observation, int32."""
+        """The most probable action for one observation: int32, or (3,) fractions."""
         inputs = self.encode(observation, context)
         batch_of_one = jax.tree.map(lambda x: x[None], inputs)
-        return jnp.argmax(self.log_probabilities(params, batch_of_one)[:, 0])
+        return self.distribution(params, batch_of_one).mode()[0]

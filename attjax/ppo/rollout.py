@@ -10,7 +10,6 @@ from flax import struct
 
 from attjax import sharding
 from attjax.envs import batch
-from attjax.ppo import losses
 from attjax.ppo.networks import Inputs, Policy
 from attjax.ppo.train_state import Learner, Setup
 
@@ -43,24 +42,22 @@ def rollout(setup: Setup, env_params: chex.ArrayTree, learner: Learner) -> tuple
     greedy = greedy_rows(setup.envs_per_device, setup.settings.ppo.greedy_share)
     key, device_key = jax.random.split(learner.key)
     device_key = jax.random.fold_in(device_key, jax.lax.axis_index(sharding.AXIS))
-    uniform_key, flight_key = jax.random.split(device_key)
+    noise_key, flight_key = jax.random.split(device_key)
 
     def step(learner, random):
-        uniform, keys = random
+        noise, keys = random
         inputs = encode(env, policy, env_params, learner.observation)
-        log_probabilities = policy.log_probabilities(learner.params, inputs)
-        sampled = sample(log_probabilities, uniform)
-        most_probable = first_row(log_probabilities == jnp.max(log_probabilities, axis=0))
-        action = jnp.where(greedy, most_probable, sampled)
+        distribution = policy.distribution(learner.params, inputs)
+        action = distribution.draw(noise, greedy)
         learner, results = fly(env, env_params, learner, action, keys)
         results["reward"] *= setup.settings.task.reward_scale
-        log_probability = losses.pick(log_probabilities, action)
+        log_probability = distribution.log_probability(action)
         return learner, Step(inputs, action, log_probability, **results)
 
     # Drawn all at once: a small draw costs as much to start as to make.
     shape = (length, setup.envs_per_device)
-    uniform = jax.random.uniform(uniform_key, shape, learner.score.dtype)
-    random = (uniform, jax.random.split(flight_key, (length, 2)))
+    noise = policy.distribution_family.noise(noise_key, shape, learner.score.dtype)
+    random = (noise, jax.random.split(flight_key, (length, 2)))
     learner, steps = jax.lax.scan(step, learner, random)
     return learner.replace(key=key), steps
 
@@ -97,26 +94,6 @@ def fly(
         is_whole=jnp.where(ended, env.starts_whole(states), learner.is_whole),
     )
     return learner, results
-
-
-def sample(log_probabilities: chex.Array, uniform: chex.Array) -> chex.Array:
-    """(samples,) random actions, by inversion of the cumulative (actions, samples) probabilities.
-
-    It takes one random number from [0, 1) a sample, where the Gumbel trick takes one an action
-    and costs more than the physics. Masked actions are never drawn, and always some action is:
-    the threshold stays a millionth below the sum, whatever the rounding.
-    """
-    probabilities = jnp.exp(log_probabilities)
-    up_to = np.tri(len(probabilities), dtype=probabilities.dtype)
-    cumulative = jnp.matmul(up_to, probabilities, precision="highest")
-    threshold = uniform * (1 - 1e-6) * cumulative[-1]
-    return first_row((cumulative > threshold) & (probabilities > 0))
-
-
-def first_row(is_candidate: chex.Array) -> chex.Array:
-    """(samples,) the first true row of each column; what argmax gives, but it vectorises."""
-    rows = len(is_candidate)
-    return jnp.min(jnp.where(is_candidate, jnp.arange(rows)[:, None], rows - 1), axis=0)
 
 
 def greedy_rows(count: int, share: float) -> np.ndarray:

@@ -48,15 +48,16 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
         craft.num_actions,
         network.rate_margin,
         network.initial_weights,
+        settings.task.actions,
     )
 
 
 def rules(task: Task) -> dict[str, Any]:
-    """What a run's settings say of the motion and of what is observed, for AttitudeEnv.
+    """What a run's settings say of the motion, the actions and what is observed, for AttitudeEnv.
 
     A run is judged by the rules that it was trained by, whatever its reward and its starts.
     """
-    names = "kinematic_factor", "observes_quaternion_rate"
+    names = "kinematic_factor", "observes_quaternion_rate", "actions"
     return {name: getattr(task, name) for name in names}
 
 

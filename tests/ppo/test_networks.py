@@ -79,10 +79,10 @@ def test_values_and_masked_probabilities_written_out(x64):
     inputs = Inputs(jnp.array(x), jnp.array(allowed))
     weights = np.exp(network("policy")) * allowed
     expected = weights / weights.sum(axis=1, keepdims=True)
-    probabilities = np.exp(policy.log_probabilities(params, inputs))
+    probabilities = np.exp(policy.distribution(params, inputs).log_probabilities)
     np.testing.assert_allclose(probabilities, expected.T, atol=1e-15)
     for row, most in enumerate(expected.argmax(axis=1)):
-        assert np.asarray(policy.logits(params, inputs))[:, row].argmax() == most
+        assert np.asarray(policy.outputs(params, inputs))[:, row].argmax() == most
 
 
 def batch_of_one(inputs):
@@ -101,7 +101,9 @@ def test_networks_map_each_sample_to_a_column():
         x = np.maximum(x, 0) if index < 2 else x
     expected = x - np.log(np.exp(x).sum(axis=1, keepdims=True))
     inputs = Inputs(features, np.ones((4, 19), bool))
-    np.testing.assert_allclose(policy.log_probabilities(params, inputs), expected.T, rtol=1e-5)
+    np.testing.assert_allclose(
+        policy.distribution(params, inputs).log_probabilities, expected.T, rtol=1e-5
+    )
     assert policy.value(params, features).shape == (4,)
 
 
@@ -110,7 +112,7 @@ def test_masked_actions_are_never_taken():
     params = parameters(policy)
     inputs = policy.encode(observe([0.449, 0, 0]), CONTEXT)
     assert not inputs.allowed[1] and inputs.allowed[2]
-    log_probabilities = policy.log_probabilities(params, batch_of_one(inputs))[:, 0]
+    log_probabilities = policy.distribution(params, batch_of_one(inputs)).log_probabilities[:, 0]
     assert float(jnp.exp(log_probabilities).sum()) == pytest.approx(1, rel=1e-5)
     assert jnp.exp(log_probabilities[1]) == 0
     actions = jax.random.categorical(jax.random.key(0), log_probabilities, shape=(10_000,))
@@ -125,7 +127,7 @@ def test_act_is_the_most_probable_action_at_any_rate():
         env = AttitudeEnv(frameskip)
         context = env.context(env.default_params)
         inputs = policy.encode(observe([0.1, 0.2, 0.0]), context)
-        expected = jnp.argmax(policy.log_probabilities(params, batch_of_one(inputs)))
+        expected = jnp.argmax(policy.distribution(params, batch_of_one(inputs)).log_probabilities)
         assert policy.act(params, observe([0.1, 0.2, 0.0]), context) == expected
 
 

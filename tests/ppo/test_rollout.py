@@ -12,7 +12,8 @@ import attjax
 from attjax import ppo
 from attjax.config import presets
 from attjax.ppo import train, train_state
-from attjax.ppo.rollout import encode, episode_sums, greedy_rows, sample
+from attjax.ppo.distributions import Categorical
+from attjax.ppo.rollout import encode, episode_sums, greedy_rows
 from attjax.runs import build
 
 
@@ -62,9 +63,8 @@ def test_a_share_of_the_spacecraft_acts_greedily(share):
     env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     _, steps = fly(setup, env_params, state)
-    log_probabilities = jax.vmap(setup.policy.log_probabilities, (None, 0))(
-        state.params, steps.inputs
-    )
+    distribution = jax.vmap(setup.policy.distribution, (None, 0))(state.params, steps.inputs)
+    log_probabilities = distribution.log_probabilities
     is_most_probable = steps.action == jnp.argmax(log_probabilities, axis=1)
     greedy = greedy_rows(64, share)
     assert [greedy[group].sum() for group in setup.slices] == [32 * share, 32 * share]
@@ -125,7 +125,7 @@ def test_sampled_actions_follow_their_probabilities_and_never_the_mask():
     probabilities = jnp.array([0.0, 0.1, 0.0, 0.6, 0.3, 0.0])
     log_probabilities = jnp.broadcast_to(jnp.log(probabilities)[:, None], (6, 200_000))
     uniform = jax.random.uniform(jax.random.key(0), (200_000,))
-    counts = jnp.bincount(sample(log_probabilities, uniform), length=6)
+    counts = jnp.bincount(Categorical(log_probabilities).draw(uniform), length=6)
     # Five standard deviations of a frequency.
     np.testing.assert_allclose(counts / 200_000, probabilities, atol=5 * 0.5 / 200_000**0.5)
     assert counts[jnp.array([0, 2, 5])].sum() == 0

@@ -33,7 +33,11 @@ def train_probe(probe, updates=60, num_devices=1, **overrides):
 
     def probability(action, *observation):
         inputs = jax.vmap(policy.encode, (0, None))(jnp.array([observation], float), None)
-        return float(jnp.exp(policy.log_probabilities(state.params, inputs))[action, 0])
+        return float(
+            jnp.exp(policy.distribution(state.params, inputs).log_probability(jnp.array([action])))[
+                0
+            ]
+        )
 
     return value, probability
 
