@@ -51,6 +51,13 @@ def _add_who(group):
     )
     compare_help = "policy, classical controllers and the paper side by side, on the same slews"
     who.add_argument("--compare", action="store_true", help=compare_help)
+    sampled_help = "let the policy draw its actions as in training, not take the most probable"
+    group.add_argument("--sampled", action="store_true", help=sampled_help)
+    actions_help = (
+        "how classical controllers without checkpoint act: by one of the torques (default), or by "
+        "any about the three axes at once; a policy acts as it was trained to"
+    )
+    group.add_argument("--actions", choices=("discrete", "continuous"), help=actions_help)
 
 
 def _add_conditions(group):
@@ -91,11 +98,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     with errors.one_line_errors(), errors.enough_memory(advice):
         devices.select_device(arguments.device)
         names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
-        trained = _trained(arguments, names)
+        config = _config(arguments, names)
+        trained = config.settings.task.frameskips if config else None
         if arguments.frameskip is None:
             arguments.frameskip = fields.frameskip_to_judge(trained or ())
-        spacecraft = _spacecraft(arguments, names)
-        controllers = {name: _controller(name, arguments, spacecraft) for name in names}
+        spacecraft = _spacecraft(arguments, config)
+        env = _env(arguments, config, spacecraft)
+        controllers = {name: _controller(name, arguments, env, config) for name in names}
         if arguments.json not in (None, STDOUT):
             destinations.check("--json", arguments.json)
         evaluation_output.prepare_playback(
@@ -110,21 +119,15 @@ def main(argv: Sequence[str] | None = None) -> int:
             json_file, aside = sys.stdout, contextlib.redirect_stdout(sys.stderr)
         command_line.warn_of_untrained(arguments.frameskip, trained)
         with aside:
-            return _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file)
+            return _evaluate(arguments, controllers, env, plots, metrics, json_file)
 
 
-def _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file):
+def _evaluate(arguments, controllers, env, plots, metrics, json_file):
     """Fly, draw, write and print."""
     # Imported late: with them, --help and errors in the arguments would take seconds.
     from attjax import evaluation
-    from attjax.envs.attitude import AttitudeEnv
     from attjax.evaluation import tables
-    from attjax.runs import build
 
-    rules = {}
-    if POLICY in controllers:
-        rules = build.rules(run_folder.read_config(arguments.checkpoint).settings.task)
-    env = AttitudeEnv(arguments.frameskip, spacecraft=spacecraft, **rules)
     params, seed, episodes = env.default_params, arguments.seed or 0, arguments.episodes
     start, results, written = time.monotonic(), [], []
     for name, controller in controllers.items():
@@ -148,9 +151,9 @@ def _evaluate(arguments, controllers, spacecraft, plots, metrics, json_file):
         for path in written:
             print(f"wrote {path}")
         if arguments.compare:
-            tables.print_comparison(results, spacecraft)
+            tables.print_comparison(results, env.spacecraft)
         else:
-            tables.print_report(results[0], spacecraft)
+            tables.print_report(results[0], env.spacecraft)
         print(f"evaluated in {seconds:.1f} s, compilation included")
     return 0
 
@@ -161,29 +164,33 @@ def _write_playback(arguments, controllers, env, params):
 
     name = next(iter(controllers))
     other = "feedback" if name == "phase-plane" else "phase-plane"
-    shown = {name: controllers[name], other: _controller(other, arguments, env.spacecraft)}
+    shown = {name: controllers[name], other: _controller(other, arguments, env, None)}
     checkpoint = arguments.checkpoint.resolve().name if name == POLICY else None
     page = playback.page(shown, env, params, arguments.seed or 0, checkpoint)
     evaluation_output.write_text(arguments.playback, page)
 
 
-def _trained(arguments, names):
-    """The frameskips that the policy was trained at; None where there is no policy."""
+def _config(arguments, names):
+    """The policy's run; None where there is no policy."""
     if arguments.frameskip is not None:
         _check_duration(arguments.duration, arguments.frameskip)
-    if POLICY in names:
-        return run_folder.read_config(arguments.checkpoint).settings.task.frameskips
-    return None
+    config = run_folder.read_config(arguments.checkpoint) if POLICY in names else None
+    if arguments.sampled and config is None:
+        raise errors.UserError(f"--sampled is for a policy; {names[0]} draws nothing")
+    if config and arguments.actions not in (None, config.settings.task.actions):
+        raise errors.UserError(
+            f"--actions is {arguments.actions}; the policy in {arguments.checkpoint} was trained "
+            f"with {config.settings.task.actions} ones, and what is judged beside it has the same"
+        )
+    return config
 
 
-def _spacecraft(arguments, names):
+def _spacecraft(arguments, config):
     """What flies, with the duration that was asked for."""
     if arguments.spacecraft is not None:
         spacecraft = toml.read_spacecraft(arguments.spacecraft)
-    elif POLICY in names:
-        spacecraft = run_folder.read_config(arguments.checkpoint).spacecraft
     else:
-        spacecraft = LM50
+        spacecraft = config.spacecraft if config else LM50
     if arguments.duration is not None:
         try:
             spacecraft = dataclasses.replace(spacecraft, duration=arguments.duration)
@@ -201,7 +208,18 @@ def _check_duration(duration, frameskip):
         )
 
 
-def _controller(name, arguments, spacecraft):
+def _env(arguments, config, spacecraft):
+    """The simulator that all controllers fly, by the rules of the policy's training."""
+    # Imported late: with it, --help and errors in the arguments would take seconds.
+    from attjax.runs import build
+
+    rules = build.rules(config.settings.task) if config else {"actions": arguments.actions}
+    if rules["actions"] is None:
+        rules = {}
+    return build.environment(arguments.frameskip, spacecraft, rules)
+
+
+def _controller(name, arguments, env, config):
     import jax
 
     from attjax.control import classical
@@ -209,11 +227,14 @@ def _controller(name, arguments, spacecraft):
 
     if name != POLICY:
         return jax.tree_util.Partial(classical.CONTROLLERS[name])
-    folder = arguments.checkpoint
-    trained_on = run_folder.read_config(folder).spacecraft
-    if trained_on.num_actions != spacecraft.num_actions:
+    folder, trained_on = arguments.checkpoint, config.spacecraft
+    if env.actions == "discrete" and trained_on.num_actions != env.num_actions:
         raise errors.UserError(
-            f"{arguments.spacecraft} has {spacecraft.num_actions} actions; the policy in {folder} "
+            f"{arguments.spacecraft} has {env.num_actions} actions; the policy in {folder} "
             f"chooses among {trained_on.num_actions}"
         )
-    return checkpoint.load_policy(folder, use_best=arguments.best)
+    update = checkpoint.best(folder) if arguments.best else None
+    if arguments.sampled:
+        policy, params = checkpoint.restore_network(folder, update)
+        return jax.tree_util.Partial(policy.draw, params, jax.random.key(arguments.seed or 0))
+    return checkpoint.restore_policy(folder, update)

@@ -6,6 +6,7 @@ Their parameters have a column for each sample, as the networks' outputs do.
 import math
 
 import chex
+import flax.linen as nn
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,8 +14,8 @@ from flax import struct
 
 from attjax.ppo import losses
 
-LEAST_LOG_STD, MOST_LOG_STD = -9.0, 0.0
-"""Bounds of a Gaussian's log standard deviation: from a ten-thousandth of the largest torque."""
+LEAST_STD = 1e-4
+"""What a Gaussian's standard deviation stays above, so that its density can be worked with."""
 
 
 @struct.dataclass
@@ -75,14 +76,16 @@ class Gaussian:
 
     @classmethod
     def of(cls, outputs: chex.Array) -> "Gaussian":
-        """That of a network's (2 axes, samples) outputs: tanh⁻¹ of the mean, then log_std.
+        """Of a network's (2 axes, samples) outputs: the mean by tanh, the deviation by sigmoid.
+
+        Both have a gradient everywhere; a clipped one could not come back from its bounds.
 
         Example:
             >>> Gaussian.of(jnp.zeros((6, 1))).mode()
             Array([[0., 0., 0.]], dtype=float32)
         """
-        mean, log_std = jnp.split(outputs, 2)
-        return cls(jnp.tanh(mean), jnp.clip(log_std, LEAST_LOG_STD, MOST_LOG_STD))
+        mean, deviation = jnp.split(outputs, 2)
+        return cls(jnp.tanh(mean), jnp.log(LEAST_STD + nn.sigmoid(deviation)))
 
     @staticmethod
     def noise(key: chex.PRNGKey, shape: tuple[int, ...], dtype: jnp.dtype) -> chex.Array:

@@ -167,6 +167,21 @@ class Policy:
 
     def act(self, params: dict, observation: chex.Array, context: Context) -> chex.Array:
         """The most probable action for one observation: int32, or (3,) fractions."""
+        return self._of_one(params, observation, context).mode()[0]
+
+    def draw(
+        self, params: dict, key: chex.PRNGKey, observation: chex.Array, context: Context
+    ) -> chex.Array:
+        """A random action for one observation, as in training: the same for the same key and state.
+
+        So it can be flown as any controller, which is told of no time and has no memory.
+        """
+        for word in jax.lax.bitcast_convert_type(observation.astype(jnp.float32), jnp.uint32):
+            key = jax.random.fold_in(key, word)
+        noise = self.distribution_family.noise(key, (1,), observation.dtype)
+        return self._of_one(params, observation, context).draw(noise)[0]
+
+    def _of_one(self, params, observation, context):
         inputs = self.encode(observation, context)
         batch_of_one = jax.tree.map(lambda x: x[None], inputs)
-        return self.distribution(params, batch_of_one).mode()[0]
+        return self.distribution(params, batch_of_one)

@@ -61,12 +61,24 @@ def rules(task: Task) -> dict[str, Any]:
     return {name: getattr(task, name) for name in names}
 
 
+def environment(frameskip: int, craft: Spacecraft, given: dict[str, Any]) -> AttitudeEnv:
+    """The simulator, with other fields by name.
+
+    Raises:
+        UserValueError: actions are continuous, and a torque of the spacecraft along no body axis.
+    """
+    try:
+        return AttitudeEnv(frameskip, spacecraft=craft, **given)
+    except ValueError as error:
+        raise UserValueError(f"{craft}: {error}") from None
+
+
 def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) -> train_state.Setup:
     """Environment, policy and settings of a training run.
 
     Raises:
         FunctionError: the reward or the features are a user's function that cannot be used.
-        UserValueError: the rate mask leaves no torque, even at rest.
+        UserValueError: the rate mask leaves no torque, even at rest, or as :func:`environment`.
     """
     reward = REWARDS.get(settings.task.reward) or user_functions.resolve(settings.task.reward)
     start = initial_state.initial_state
@@ -75,7 +87,8 @@ def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) ->
             settings.task.near_goal_share, settings.task.near_goal_steps
         )
     frameskip = max(settings.task.frameskips)
-    env = AttitudeEnv(frameskip, reward, start, craft, **rules(settings.task))
+    given = {"reward": reward, "initial_state": start, **rules(settings.task)}
+    env = environment(frameskip, craft, given)
     if settings.task.reward not in REWARDS:
         first_reward = functools.partial(_first_reward, env)
         user_functions.check(
@@ -110,7 +123,8 @@ def _check_that_torques_are_left(settings, craft):
 
 def _first_reward(env):
     params, key = env.default_params, jax.random.key(0)
-    return env.step_env(key, env.reset(key, params)[1], 0, params)[2]
+    none = jnp.zeros(env.action_space(params).shape, env.action_space(params).dtype)
+    return env.step_env(key, env.reset(key, params)[1], none, params)[2]
 
 
 def _first_sight(craft):

@@ -29,7 +29,8 @@ class Probe:
     The observation is (sign, step / length), or (sign, 0) where time is not shown.
     ``reward`` is one of:
     "constant", 1 each step; "sign", the observed sign; "last", 1 at the last step;
-    "match", 1 where action 1 meets sign +1 or action 0 meets sign −1, else 0.
+    "match", 1 where action 1 meets sign +1 or action 0 meets sign −1, else 0;
+    "aim", minus the squared distance of a (3,) action from (sign / 2, 0, 0).
     """
 
     reward: str
@@ -58,11 +59,12 @@ class Probe:
         final = jnp.stack([sign, time / self.length * self.shows_time])
         at_end = time >= params.max_steps_in_episode
         reward = {
-            "constant": jnp.ones(()),
-            "sign": sign,
-            "last": jnp.where(at_end, 1.0, 0.0),
-            "match": jnp.where((action == 1) == (sign > 0), 1.0, 0.0),
-        }[self.reward]
+            "constant": lambda: jnp.ones(()),
+            "sign": lambda: sign,
+            "last": lambda: jnp.where(at_end, 1.0, 0.0),
+            "match": lambda: jnp.where((action == 1) == (sign > 0), 1.0, 0.0),
+            "aim": lambda: -jnp.sum((action - jnp.stack([sign / 2, 0.0, 0.0])) ** 2),
+        }[self.reward]()
         never = jnp.zeros((), bool)
         terminated, truncated = (never, at_end) if self.truncates else (at_end, never)
         info = {"truncated": truncated, "score": reward, "outcome": {}}

@@ -33,11 +33,8 @@ def train_probe(probe, updates=60, num_devices=1, **overrides):
 
     def probability(action, *observation):
         inputs = jax.vmap(policy.encode, (0, None))(jnp.array([observation], float), None)
-        return float(
-            jnp.exp(policy.distribution(state.params, inputs).log_probability(jnp.array([action])))[
-                0
-            ]
-        )
+        distribution = policy.distribution(state.params, inputs)
+        return float(jnp.exp(distribution.log_probability(jnp.array([action])))[0])
 
     return value, probability
 
@@ -64,6 +61,20 @@ def test_actions_follow_the_advantage(num_devices):
     _, probability = train_probe(Probe("match"), num_devices=num_devices)
     assert probability(1, 1, 0) > 0.95
     assert probability(0, -1, 0) > 0.95
+
+
+@pytest.mark.parametrize("num_devices", [1, 2])
+def test_continuous_actions_follow_the_advantage(num_devices):
+    """About the first axis what the sign asks for, ½ or −½; about the others none; and surely."""
+    policy = Policy(hidden_sizes=(32, 32), actions="continuous")
+    probe = Probe("aim")
+    setup = train_state.Setup(probe, policy, settings(120), num_devices=num_devices)
+    state, _ = train(setup, probe.default_params)
+    observed = jnp.array([[1.0, 0.0], [-1.0, 0.0]])
+    inputs = jax.vmap(policy.encode, (0, None))(observed, None)
+    distribution = policy.distribution(state.params, inputs)
+    np.testing.assert_allclose(distribution.mode(), [[0.5, 0, 0], [-0.5, 0, 0]], atol=0.1)
+    assert float(jnp.max(distribution.log_std)) < -1
 
 
 def test_value_bootstraps_at_the_time_limit_where_asked():
