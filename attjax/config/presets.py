@@ -102,7 +102,20 @@ PRECISE = Settings(
 )
 """The default: one policy for every control rate, pointing far below Table 2."""
 
-PRESETS = {"precise": PRECISE, "paper": PAPER, "paper-gae": PAPER_GAE, "paper-fast": PAPER_FAST}
+CONTINUOUS = PRECISE.replace(actions="continuous", rate_margin=0.0, greedy_share=0.0)
+"""Any torque about the three axes at once, from a Gaussian policy: the predecessor's actions.
+
+The rate mask is one of discrete actions, and a Gaussian's mode is its mean, which its samples
+surround: the greedy need no share of the spacecraft.
+"""
+
+PRESETS = {
+    "precise": PRECISE,
+    "paper": PAPER,
+    "paper-gae": PAPER_GAE,
+    "paper-fast": PAPER_FAST,
+    "continuous": CONTINUOUS,
+}
 """Presets by the names that ``train.py --preset`` knows."""
 
 REMARKS = {
