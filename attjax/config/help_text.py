@@ -43,7 +43,7 @@ def defaults(name: str) -> str:
 
     Example:
         >>> defaults("clip"), defaults("discount")
-        ('default: 0.2', 'precise: 0.995; paper, paper-gae, paper-fast: 0.99')
+        ('default: 0.2', 'precise, continuous: 0.995; paper, paper-gae, paper-fast: 0.99')
     """
     presets_of: dict[str, list[str]] = {}
     for preset, values in presets.PRESETS.items():
