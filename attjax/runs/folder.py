@@ -29,7 +29,7 @@ try:
 except ImportError:  # Windows, where runs are not kept apart
     fcntl = None
 
-FORMAT = 7
+FORMAT = 8
 CONFIG, METRICS = belongings.CONFIG, belongings.METRICS
 LOST = "lost+found"
 
@@ -193,16 +193,16 @@ def read_config(folder: Path) -> Config:
 
 
 def _with_later_settings(content):
-    """Format 6 had fewer settings, and format 5 had them in one table."""
+    """Formats 6 and 7 had fewer settings, and format 5 had them in one table."""
     given = content["settings"]
-    if content["format"] == 6:
+    if content["format"] > 5:
         given = {name: x for subject in given.values() for name, x in subject.items()}
     later = {name: f.metadata["before"] for name, f in FIELDS.items() if "before" in f.metadata}
     by_subject = dataclasses.asdict(settings.from_flat(later | given))
-    return content | {"format": 7, "settings": by_subject}
+    return content | {"format": FORMAT, "settings": by_subject}
 
 
-UPGRADES = {5: _with_later_settings, 6: _with_later_settings}
+UPGRADES = dict.fromkeys((5, 6, 7), _with_later_settings)
 """What makes the content of an earlier format one of the present format."""
 
 

@@ -24,6 +24,9 @@ LATER = (
 )
 """Settings that there were none of in formats 5 and 6."""
 
+LATEST = ("actions",)
+"""Settings that there were none of in format 7, either."""
+
 
 def test_config_round_trip(tmp_path):
     run_folder.create(tmp_path, CONFIG, overwrite=False)
@@ -54,24 +57,25 @@ def as_format_5(folder):
     """Rewrite a run's config.json as versions did that had the settings in one table."""
     content = json.loads((folder / "config.json").read_text())
     settings = {k: x for subject in content["settings"].values() for k, x in subject.items()}
-    for name in LATER:
+    for name in LATER + LATEST:
         del settings[name]
     content |= {"format": 5, "settings": settings}
     (folder / "config.json").write_text(json.dumps(content))
 
 
-def test_a_run_of_format_6_is_read_as_it_was_meant(tmp_path):
+@pytest.mark.parametrize("version, missing", [(6, LATER + LATEST), (7, LATEST)])
+def test_a_run_of_an_earlier_format_is_read_as_it_was_meant(tmp_path, version, missing):
     """It had no word for what was settled then."""
     run_folder.create(tmp_path, CONFIG, overwrite=False)
     path = tmp_path / "config.json"
     content = json.loads(path.read_text())
     for subject in content["settings"].values():
-        for name in LATER:
+        for name in missing:
             subject.pop(name, None)
-    path.write_text(json.dumps(content | {"format": 6}))
+    path.write_text(json.dumps(content | {"format": version}))
     assert run_folder.read_config(tmp_path) == CONFIG
     path.write_text(json.dumps(content))
-    with pytest.raises(FolderError, match="missing: " + ", ".join(sorted(LATER))):
+    with pytest.raises(FolderError, match="missing: " + ", ".join(sorted(missing))):
         run_folder.read_config(tmp_path)
 
 
@@ -80,7 +84,7 @@ def test_a_run_of_format_5_is_read_as_it_was_meant(tmp_path):
     as_format_5(tmp_path)
     assert run_folder.read_config(tmp_path) == CONFIG
     run_folder.write_config(tmp_path, CONFIG)
-    assert json.loads((tmp_path / "config.json").read_text())["format"] == 7
+    assert json.loads((tmp_path / "config.json").read_text())["format"] == run_folder.FORMAT
     assert run_folder.read_config(tmp_path) == CONFIG
 
 
