@@ -126,3 +126,20 @@ def parameter_hash(params: dict) -> str:
         for values in (layer.weights, layer.biases):
             digest.update(values.astype("<f4").tobytes())
     return digest.hexdigest()[:16]
+
+
+def decide(
+    flight: FlightPolicy, quaternion: chex.Array, angular_velocity: chex.Array
+) -> tuple[chex.Array, chex.Array] | chex.Array:
+    """What the policy does in one state; pure JAX.
+
+    Args:
+        flight: the policy.
+        quaternion: (4,) unit error quaternion, scalar last.
+        angular_velocity: (3,) body frame, rad/s.
+
+    Returns:
+        The action, an int32 scalar, and the logits (actions,); or, of continuous actions, the
+        torque (3,), body frame, N m.
+    """
+    return flight.kind.decide(flight, quaternion, angular_velocity)

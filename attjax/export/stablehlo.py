@@ -44,7 +44,7 @@ def files(
 
 
 def _export(flight, platforms):
-    decide: Callable = functools.partial(flight.kind.decide, flight)
+    decide: Callable = functools.partial(flight_policy.decide, flight)
     decide.__name__ = f"attjax_policy_{flight_policy.parameter_hash(flight.params)}"
     shapes = (jax.ShapeDtypeStruct((size,), jnp.float32) for size in (4, 3))
     with _no_source_lines():

@@ -8,7 +8,7 @@
  *
 $state
  *
- * If a number is not finite, or the state so large that single precision does not hold what the
- * network computes of it, there is no torque: {0, 0, 0}.
+ * If a number is not finite, there is no torque: {0, 0, 0}; nor is there one if the network leads
+ * to NaN, as it may of numbers that are near the end of single precision.
  */
 void attjax_torque(const float quaternion[4], const float angular_velocity[3], float torque[3]);
