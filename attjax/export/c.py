@@ -35,114 +35,76 @@ def files(flight: FlightPolicy, seed: int, prefix: str = c_names.PREFIX) -> dict
 
 def policy_files(flight: FlightPolicy, prefix: str = c_names.PREFIX) -> dict[str, str]:
     """The header and the source."""
-    values = _header_values(flight) | _source_values(flight, prefix)
-    return _filled(POLICY_FILES, prefix, _own_facts(flight) | values)
+    decision = flight.kind.c(flight)
+    values = _values(flight, decision, prefix) | _source_values(flight, decision, prefix)
+    return _filled(POLICY_FILES, prefix, decision.parts, values)
 
 
 def test_files(flight: FlightPolicy, seed: int, prefix: str = c_names.PREFIX) -> dict[str, str]:
     """The test program, and the test vectors that it includes."""
-    return _filled(TEST_FILES, prefix, _own_facts(flight) | _vector_values(flight, seed))
+    decision = flight.kind.c(flight)
+    values = _values(flight, decision, prefix) | _vector_values(flight, seed)
+    return _filled(TEST_FILES, prefix, decision.test_parts, values)
 
 
-def _filled(names, prefix, values):
+def _filled(names, prefix, parts, values):
     c_names.check(prefix)
+    values = {**values}
+    for name, file in parts.items():
+        values[name] = _fill(file, prefix, values)
     return {c_names.renamed(name, prefix): _fill(name, prefix, values) for name in names}
 
 
 def constant_bytes(flight: FlightPolicy) -> int:
     """Bytes of the constants in the C source."""
-    count = sum(x.weights.size + x.biases.size for x in flight.layers) + flight.torque_table.size
-    count += _inputs(flight).constants
-    mask = flight.rate_mask
-    if mask is not None:
-        count += mask.form.size + mask.impulse.size + mask.own_gain.size + 1
-    return 4 * count
+    count = sum(x.weights.size + x.biases.size for x in flight.layers)
+    return 4 * (count + _inputs(flight).constants + flight.kind.c(flight).constants)
 
 
 def stack_bytes(flight: FlightPolicy) -> int:
     """Bytes of the arrays that a decision has on the stack at once."""
     inputs, hidden = flight.layers[0].weights.shape[0], sum(flight.policy.hidden_sizes)
-    return 4 * (inputs + hidden + 2 * len(flight.torque_table))  # the last: logits, allowed
+    return 4 * (inputs + hidden + flight.kind.c(flight).stack)
 
 
 def operations(flight: FlightPolicy) -> dict[str, int]:
     """Operations of a decision: multiply_adds, tanh, comparisons (at most) and other."""
-    actions = len(flight.torque_table)
-    multiply_adds = sum(x.weights.size for x in flight.layers)
-    comparisons = 7 + sum(flight.policy.hidden_sizes) + actions - 1
-    inputs = _inputs(flight)
-    other = inputs.other
-    if flight.rate_mask is not None:
-        multiply_adds += 9 + 3 + 3 * actions
-        other += 3 * actions
-        comparisons += 2 * actions
+    inputs, decision = _inputs(flight), flight.kind.c(flight)
     return {
-        "multiply_adds": multiply_adds,
-        "tanh": inputs.tanh,
-        "comparisons": comparisons,
-        "other": other,
+        "multiply_adds": sum(x.weights.size for x in flight.layers) + decision.multiply_adds,
+        "tanh": inputs.tanh + decision.tanh,
+        "comparisons": 7 + sum(flight.policy.hidden_sizes) + decision.comparisons,
+        "other": inputs.other + decision.other,
     }
 
 
-def _own_facts(flight):
-    """What a file says of itself in its first comment."""
+def _values(flight, decision, prefix):
+    """What a file says of itself in its first comment, and what its kind of action says."""
     lines = [f" *   {k + ':':<13}{c_text.comment(v, INDENT)}" for k, v in flight.facts.items()]
-    return {"facts": "\n".join(lines)}
+    names = {name: c_names.renamed(text, prefix) for name, text in decision.names.items()}
+    return {"facts": "\n".join(lines), **names, **decision.values}
 
 
-def _header_values(flight):
-    context = flight.context
+def _source_values(flight, decision, prefix):
+    inputs, context = _inputs(flight), flight.context
     return operations(flight) | {
-        "actions": len(flight.torque_table),
+        "state": _fill("state.h", prefix, {}).rstrip("\n"),
         "inertia": c_text.comment(_inertia(flight.env.spacecraft.inertia), INDENT),
-        "kept_rate": c_text.comment(_kept_rate(flight), INDENT),
+        "kept_rate": c_text.comment(decision.kept_rate, INDENT),
         "constant_bytes": constant_bytes(flight),
         "stack_bytes": stack_bytes(flight),
-        "no_torque": flight.no_torque,
         "control_period": c_text.number(flight.env.control_period),
         "pulse": c_text.number(context.torque_duration),
         "rate_limit": c_text.number(context.rate_limit),
-    }
-
-
-def _kept_rate(flight):
-    margin = flight.policy.rate_margin
-    if margin == 0:
-        return "there is no mask; nothing keeps it but what was learned"
-    return (
-        f"actions after which the coasting motion would pass {margin} of it are masked, except "
-        f"those that lower that motion's largest rate"
-    )
-
-
-def _source_values(flight, prefix):
-    inputs = _inputs(flight)
-    return {
         "features": flight.layers[0].weights.shape[0],
-        "torque_table": c_text.table(flight.torque_table),
         "weights": "\n".join(_weights(n, x) for n, x in enumerate(flight.layers, 1)),
         "features_function": _fill(inputs.template, prefix, inputs.values),
-        "forward": _forward(flight.layers),
-        "allow_function": _allow_function(flight, prefix),
+        "forward": _forward(flight.layers, decision.values["outputs"]),
     }
 
 
 def _inputs(flight: FlightPolicy) -> CInputs:
     return FORMS[flight.policy.features].c(flight.control_period)
-
-
-def _allow_function(flight, prefix):
-    mask = flight.rate_mask
-    if mask is None:
-        return _fill("allow_all.c", prefix, {})
-    values = {
-        "form": c_text.table(mask.form),
-        "impulse": c_text.table(mask.impulse),
-        "own_gain": c_text.table(mask.own_gain),
-        "limit_squared": c_text.table(mask.limit_squared),
-        "margin": flight.policy.rate_margin,
-    }
-    return _fill("allow_rate_mask.c", prefix, values)
 
 
 def _weights(number, layer):
@@ -154,36 +116,37 @@ def _weights(number, layer):
     )
 
 
-def _forward(layers):
-    """The body of attjax_logits: one call for each layer."""
+def _forward(layers, outputs):
+    """The body of the function that fills in the outputs: one call for each layer."""
     hidden = range(1, len(layers))
     sizes = {n: layers[n - 1].weights.shape[1] for n in hidden}
     lines = ["float features[FEATURES];"]
     lines += [f"float hidden_{n}[{sizes[n]}];" for n in hidden]
     lines += ["", "features_of(quaternion, angular_velocity, features);"]
     x = "features"
-    for n, (inputs, outputs) in enumerate((x.weights.shape for x in layers), 1):
-        y = f"hidden_{n}" if n in sizes else "logits"
-        lines += [f"layer({inputs}, {outputs}, weights_{n}, biases_{n}, {x}, {y});"]
-        lines += [f"rectify({outputs}, {y});"] if n in sizes else []
+    for n, (rows, columns) in enumerate((x.weights.shape for x in layers), 1):
+        y = f"hidden_{n}" if n in sizes else outputs
+        lines += [f"layer({rows}, {columns}, weights_{n}, biases_{n}, {x}, {y});"]
+        lines += [f"rectify({columns}, {y});"] if n in sizes else []
         x = y
     return "\n".join("    " + line if line else "" for line in lines)
 
 
 def _vector_values(flight, seed):
     flown = flight_check.flown_decisions(flight, seed, VECTOR_SLEWS, 4 * VECTORS // VECTOR_SLEWS)
-    clear = np.flatnonzero(flown.clear)
-    if not len(clear):
+    usable = np.flatnonzero(flown.comparable)
+    if not len(usable):
         raise ValueError("all its decisions hang on rounding")
-    chosen = clear[np.linspace(0, len(clear) - 1, min(VECTORS, len(clear))).astype(int)]
+    chosen = usable[np.linspace(0, len(usable) - 1, min(VECTORS, len(usable))).astype(int)]
     states = [map(c_text.row, (flown.quaternion[i], flown.angular_velocity[i])) for i in chosen]
-    rows = [f"{{{', '.join(x)}, {flown.action[i]}}}" for i, x in zip(chosen, states)]
+    rows = [f"{{{', '.join(x)}, {flown.c_decision(i)}}}" for i, x in zip(chosen, states)]
     slews = flight_check.fly_table_5(flight)
     inertia = np.asarray(flight.context.inertia, float)
     tensor = np.diag(inertia) if inertia.ndim == 1 else inertia
     rk4_steps = 1 + flight.env.frameskip
     torque_steps = rk4_steps if flight.env.default_params.torque_held else 1
     return {
+        **flown.c_values,
         "tensor": c_text.table(tensor, c_text.double),
         "inverse": c_text.table(np.linalg.inv(tensor), c_text.double),
         "torque_steps": torque_steps,

@@ -1,7 +1,6 @@
 """What a policy does at states and on slews, for its exports to be checked against."""
 
 import dataclasses
-import functools
 
 import chex
 import jax
@@ -11,68 +10,17 @@ import numpy as np
 from attjax import evaluation
 from attjax.dynamics import quaternion as quaternions
 from attjax.evaluation import paper
-from attjax.export import flight_policy
 from attjax.export.flight_policy import FlightPolicy
-from attjax.ppo import networks
-
-TIE = 1e-4
-"""Actions whose logits differ by less than this share of the logits' range are tied."""
-
-MASK_ROUNDING = 1e-6
-"""Relative change of ω that must not change which actions are masked in a clear decision."""
+from attjax.export.kind import States
 
 
-@dataclasses.dataclass(frozen=True)
-class Decisions:
-    """States, and what the policy does there.
-
-    Attributes:
-        quaternion, angular_velocity: (states, 4) and (states, 3).
-        action: (states,) int32.
-        logits: (states, actions), MASKED_LOGIT where masked.
-        clear: (states,) bool, whether rounding cannot decide: the two best actions are no tie,
-            and no action is within rounding of being masked or not.
-    """
-
-    quaternion: np.ndarray
-    angular_velocity: np.ndarray
-    action: np.ndarray
-    logits: np.ndarray
-    clear: np.ndarray
-
-
-def decisions(
-    flight: FlightPolicy, quaternion: chex.Array, angular_velocity: chex.Array
-) -> Decisions:
+def decisions(flight: FlightPolicy, quaternion: chex.Array, angular_velocity: chex.Array) -> States:
     """What the policy does at the states (states, 4) and (states, 3)."""
-    quaternion, angular_velocity = (
-        np.asarray(x, np.float32) for x in (quaternion, angular_velocity)
-    )
-    action, logits = map(np.asarray, _decide_all(flight, quaternion, angular_velocity))
-    nearby = [
-        np.asarray(_decide_all(flight, quaternion, angular_velocity * np.float32(1 + change))[1])
-        for change in (-MASK_ROUNDING, MASK_ROUNDING)
-    ]
-    masked = logits == networks.MASKED_LOGIT
-    same_mask = [np.all((x == networks.MASKED_LOGIT) == masked, axis=1) for x in nearby]
-    clear = _not_tied(logits, masked) & same_mask[0] & same_mask[1]
-    return Decisions(quaternion, angular_velocity, action, logits, clear)
+    single = (np.asarray(x, np.float32) for x in (quaternion, angular_velocity))
+    return flight.kind.states(flight, *single)
 
 
-@functools.partial(jax.jit, static_argnums=0)
-def _decide_all(flight, quaternion, angular_velocity):
-    return jax.vmap(functools.partial(flight_policy.decide, flight))(quaternion, angular_velocity)
-
-
-def _not_tied(logits, masked):
-    """Whether the best logit leads the second by TIE of their range; not if one is NaN."""
-    second, best = np.sort(np.where(masked, -np.inf, logits), axis=1)[:, -2:].T
-    least = np.min(np.where(masked, np.inf, logits), axis=1)
-    with np.errstate(invalid="ignore"):
-        return best - second > TIE * (best - least)
-
-
-def flown_decisions(flight: FlightPolicy, seed: int, slews: int, states_per_slew: int) -> Decisions:
+def flown_decisions(flight: FlightPolicy, seed: int, slews: int, states_per_slew: int) -> States:
     """Decisions at states evenly spaced in time along random slews that the policy flies."""
     params = flight.env.default_params
     key = jax.random.key(seed)

@@ -5,18 +5,21 @@ import functools
 import hashlib
 
 import chex
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from attjax.control import assurance
-from attjax.control.assurance import RateMask
 from attjax.envs import observation as observations
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
 from attjax.export import provenance
+from attjax.export.continuous import CONTINUOUS
+from attjax.export.discrete import DISCRETE
+from attjax.export.kind import Kind
 from attjax.export.provenance import Origin
 from attjax.ppo.networks import Policy
+
+KINDS = {"discrete": DISCRETE, "continuous": CONTINUOUS}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,7 +42,8 @@ class FlightPolicy:
 
     Raises:
         ValueError: a parameter is not finite in float32, it is not one action alone that has no
-            torque, or the simulator has other rules than Eq. 9 and 11, which a spacecraft obeys.
+            torque, the simulator has another kind of actions than the policy, or other rules than
+            Eq. 9 and 11, which a spacecraft obeys.
     """
 
     policy: Policy
@@ -53,11 +57,20 @@ class FlightPolicy:
             raise ValueError(f"kinematic_factor is {factor}; a spacecraft moves by Eq. 9, with 0.5")
         if not self.env.observes_quaternion_rate:
             raise ValueError("observes_quaternion_rate is False; flight software is told of Eq. 11")
-        arrays = [x for layer in self.layers for x in (layer.weights, layer.biases)]
+        if self.env.actions != self.policy.actions:
+            raise ValueError(
+                f"the simulator has {self.env.actions} actions, the policy {self.policy.actions}"
+            )
+        arrays = [x for layer in _layers(self.params) for x in (layer.weights, layer.biases)]
         if not all(np.all(np.isfinite(x)) for x in arrays):
             raise ValueError("the policy has parameters that are not finite")
         if np.sum(assurance.coasts(self.torque_table)) != 1:
             raise ValueError("the torque table must have one action without torque")
+
+    @property
+    def kind(self) -> Kind:
+        """Of its actions."""
+        return KINDS[self.policy.actions]
 
     @functools.cached_property
     def context(self) -> Context:
@@ -69,7 +82,7 @@ class FlightPolicy:
         del context
         single = observation.astype(jnp.float32)
         state = single[observations.QUATERNION], single[observations.ANGULAR_VELOCITY]
-        return decide(self, *state)[0]
+        return self.policy.act(self.params, observations.observe(*state), self.context)
 
     @property
     def control_period(self) -> np.float32:
@@ -82,28 +95,17 @@ class FlightPolicy:
         return np.asarray(self.context.torque_table, np.float32) + np.float32(0)
 
     @property
-    def no_torque(self) -> int:
-        """The action without torque."""
-        return int(np.flatnonzero(assurance.coasts(self.torque_table))[0])
-
-    @property
     def layers(self) -> list[Layer]:
-        """The policy network's layers, from the features to the logits."""
-        return _layers(self.params)
+        """The policy network's layers, from the features to what the decision is made of."""
+        *hidden, last = _layers(self.params)
+        outputs = slice(self.kind.outputs)
+        return [*hidden, Layer(last.weights[:, outputs], last.biases[outputs])]
 
     @property
     def facts(self) -> dict[str, str]:
         """What an exported file says of itself: :func:`attjax.export.provenance.facts`."""
         parameters = parameter_hash(self.params)
         return provenance.facts(self.origin, self.env.frameskip, self.env.spacecraft, parameters)
-
-    @property
-    def rate_mask(self) -> RateMask | None:
-        """The mask in float32, as NumPy arrays; None if the policy has none."""
-        if self.policy.rate_margin == 0:
-            return None
-        mask = assurance.rate_mask(self.context, self.policy.rate_margin)
-        return jax.tree.map(lambda x: np.asarray(x, np.float32), mask)
 
 
 def _layers(params):
@@ -128,17 +130,16 @@ def parameter_hash(params: dict) -> str:
 
 def decide(
     flight: FlightPolicy, quaternion: chex.Array, angular_velocity: chex.Array
-) -> tuple[chex.Array, chex.Array]:
-    """The action, an int32 scalar, and the logits (actions,) for one state; pure JAX.
+) -> tuple[chex.Array, chex.Array] | chex.Array:
+    """What the policy does in one state; pure JAX.
 
     Args:
         flight: the policy.
         quaternion: (4,) unit error quaternion, scalar last.
         angular_velocity: (3,) body frame, rad/s.
+
+    Returns:
+        The action, an int32 scalar, and the logits (actions,); or, of continuous actions, the
+        torque (3,), body frame, N m.
     """
-    observation = observations.observe(quaternion, angular_velocity)
-    inputs = flight.policy.encode(observation, flight.context)
-    batch_of_one = jax.tree.map(lambda x: x[None], inputs)
-    logits = flight.policy.outputs(flight.params, batch_of_one)[:, 0]
-    action = flight.policy.act(flight.params, observation, flight.context)
-    return action.astype(jnp.int32), logits
+    return flight.kind.decide(flight, quaternion, angular_velocity)

@@ -8,6 +8,7 @@ To call it in Python, on any platform of PLATFORMS, with nothing but JAX and fla
 
 with a float32 unit error quaternion (4,), scalar last, and a float32 angular velocity (3,) in the
 body frame, rad/s; ``action`` is an int32 scalar, and ``logits`` (actions,) are -1e9 where masked.
+Where actions are continuous, the call gives the torque alone, (3,) float32, body frame, N m.
 Numbers that are not finite are not looked for. ``attjax_policy.stablehlo`` is the same program as
 StableHLO bytecode, for other compilers: its ``main`` takes the quaternion and the angular velocity
 and nothing else. Both have the hash of the parameters in the name of their function, and
@@ -16,7 +17,6 @@ and nothing else. Both have the hash of the parameters in the name of their func
 
 import contextlib
 import functools
-import textwrap
 from collections.abc import Callable
 
 import flatbuffers  # noqa: F401  jax.export needs it only when it writes; fail here instead
@@ -64,11 +64,12 @@ def _no_source_lines():
 
 
 def _text(flight):
-    lines = [f"{name + ':':<13}{line}" for name, line in flight.facts.items()]
-    text = f"""
-        quaternion:  float32 (4,), unit error quaternion, scalar last
-        rate:        float32 (3,), angular velocity in the body frame, rad/s
-        action:      int32, a row of the torque table
-        logits:      float32 ({len(flight.torque_table)},), -1e9 where masked
-    """
-    return "\n".join(lines) + "\n" + textwrap.dedent(text)
+    state = {
+        "quaternion": "float32 (4,), unit error quaternion, scalar last",
+        "rate": "float32 (3,), angular velocity in the body frame, rad/s",
+    }
+    return _lines(flight.facts) + "\n" + _lines(state | flight.kind.results(flight))
+
+
+def _lines(items):
+    return "".join(f"{name + ':':<13}{line}\n" for name, line in items.items())

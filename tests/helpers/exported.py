@@ -24,7 +24,7 @@ from attjax import AttitudeEnv
 from attjax.evaluation import paper
 from attjax.export import c as export_c
 from attjax.export import flight_check, provenance
-from attjax.export.flight_check import Decisions
+from attjax.export.discrete import Decisions
 from attjax.export.flight_policy import FlightPolicy
 from attjax.ppo.networks import Policy
 from attjax.runs import build, checkpoint

@@ -17,8 +17,7 @@ $facts
 
 #define FEATURES $features
 
-const float attjax_torque_table[ATTJAX_ACTIONS][3] = $torque_table;
-
+$torques
 $weights
 $features_function
 /* y = Wx + b. The weights of one input lie side by side. */
@@ -44,13 +43,7 @@ static void rectify(int size, float *x)
     }
 }
 
-void attjax_logits(const float quaternion[4], const float angular_velocity[3],
-                   float logits[ATTJAX_ACTIONS])
-{
-$forward
-}
-
-$allow_function
+$network
 static int all_finite(const float quaternion[4], const float angular_velocity[3])
 {
     int result = 1;
@@ -63,21 +56,4 @@ static int all_finite(const float quaternion[4], const float angular_velocity[3]
     return result;
 }
 
-int attjax_decide(const float quaternion[4], const float angular_velocity[3])
-{
-    float logits[ATTJAX_ACTIONS];
-    int allowed[ATTJAX_ACTIONS];
-    int best = -1;
-
-    if (!all_finite(quaternion, angular_velocity)) {
-        return ATTJAX_NO_TORQUE;
-    }
-    attjax_logits(quaternion, angular_velocity, logits);
-    allow(angular_velocity, allowed);
-    for (int a = 0; a < ATTJAX_ACTIONS; a++) {
-        if (allowed[a] && (best < 0 || logits[a] > logits[best])) {
-            best = a; /* the first of equal ones */
-        }
-    }
-    return best; /* none is no case: no torque is always allowed */
-}
+$decide

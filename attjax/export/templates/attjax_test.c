@@ -79,14 +79,14 @@ static double norm(const double *x, int size)
 static void control(double x[STATE])
 {
     static const float none[3] = {0.0f, 0.0f, 0.0f};
-    const float *torque;
+    $torque_declared
     float single[STATE];
     double length;
 
     for (int i = 0; i < STATE; i++) {
         single[i] = (float)x[i];
     }
-    torque = attjax_torque_table[attjax_decide(single, single + 4)];
+    $torque_decided
     for (int n = 0; n < TORQUE_STEPS; n++) {
         advance(x, torque);
     }
@@ -130,19 +130,7 @@ static int fly(void)
     return failures;
 }
 
-/* Returns how many decisions differ from those in attjax. */
-static int compare(void)
-{
-    int failures = 0;
-
-    for (int v = 0; v < VECTORS; v++) {
-        const int action = attjax_decide(vectors[v].quaternion, vectors[v].angular_velocity);
-        failures += action != vectors[v].action;
-    }
-    printf("vectors: %d of %d decisions as in attjax\n", VECTORS - failures, VECTORS);
-    return failures;
-}
-
+$compare
 /* Returns in how many of its places a number that is not finite does not lead to no torque. */
 static int spoil(void)
 {
@@ -151,9 +139,9 @@ static int spoil(void)
     for (int i = 0; i < STATE; i++) {
         float x[STATE] = {0.0f, 0.0f, 0.0f, 1.0f, 0.1f, 0.1f, 0.1f};
         x[i] = NAN;
-        failures += attjax_decide(x, x + 4) != ATTJAX_NO_TORQUE;
+        failures += $turns;
         x[i] = INFINITY;
-        failures += attjax_decide(x, x + 4) != ATTJAX_NO_TORQUE;
+        failures += $turns;
     }
     printf("not finite: %d of %d lead to no torque\n", 2 * STATE - failures, 2 * STATE);
     return failures;
@@ -162,11 +150,11 @@ static int spoil(void)
 static void measure(void)
 {
     const clock_t start = clock();
-    volatile int sink = 0;
+    $sink
 
     for (int n = 0; n < TIMED; n++) {
         for (int v = 0; v < VECTORS; v++) {
-            sink = attjax_decide(vectors[v].quaternion, vectors[v].angular_velocity);
+            $timed
         }
     }
     (void)sink;

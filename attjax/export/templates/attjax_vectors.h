@@ -21,12 +21,12 @@ static const double slew_start[SLEWS][4] = $slew_start;
 static const double slew_error_deg[SLEWS] = $slew_error_deg;
 static const double slew_rate[SLEWS] = $slew_rate;
 
-/* States of random slews, whose decision does not hang on rounding. */
+/* States of random slews, $compared. */
 #define VECTORS $vectors
 static const struct {
     float quaternion[4];
     float angular_velocity[3];
-    int action;
+    $decision;
 } vectors[VECTORS] = $vector_values;
 
 #endif

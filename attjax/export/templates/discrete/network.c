@@ -1,0 +1,7 @@
+void attjax_logits(const float quaternion[4], const float angular_velocity[3],
+                   float logits[ATTJAX_ACTIONS])
+{
+$forward
+}
+
+$allow
