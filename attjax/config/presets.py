@@ -102,11 +102,11 @@ PRECISE = Settings(
 )
 """The default: one policy for every control rate, pointing far below Table 2."""
 
-CONTINUOUS = PRECISE.replace(actions="continuous", rate_margin=0.0, greedy_share=0.0)
+CONTINUOUS = PRECISE.replace(actions="continuous", rate_margin=0.96, greedy_share=0.0)
 """Any torque about the three axes at once, from a Gaussian policy: the predecessor's actions.
 
-The rate mask is one of discrete actions, and a Gaussian's mode is its mean, which its samples
-surround: the greedy need no share of the spacecraft.
+The rate mask is one of discrete actions, so a margin is learned instead. A Gaussian's mode is its
+mean, which its samples surround: the greedy need no share of the spacecraft.
 """
 
 PRESETS = {

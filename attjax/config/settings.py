@@ -39,11 +39,6 @@ class Settings:
                 f"num_envs is {self.ppo.num_envs}; it must be at least "
                 f"{len(self.task.frameskips)}, the number of frameskips"
             )
-        if self.task.actions == "continuous" and self.network.rate_margin > 0:
-            raise ValueError(
-                f"rate_margin is {self.network.rate_margin:g}; with continuous actions it must be "
-                f"0, as the mask is one of discrete ones"
-            )
         self._check_sizes()
 
     def _check_sizes(self):

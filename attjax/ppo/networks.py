@@ -91,8 +91,7 @@ class Policy:
         hidden_sizes: neurons of each hidden layer.
         num_actions: how many a categorical policy chooses from.
         rate_margin: the fraction of the rate limit that :func:`attjax.control.assurance.rate_mask`
-        keeps;
-            0: no mask.
+            keeps; 0: no mask. Continuous actions are not masked.
         initial_weights: "orthogonal", or "uniform" up to 1/√inputs with biases, as PyTorch's.
         actions: "discrete"; or "continuous", a Gaussian over (3,) fractions of the largest torques.
     """

@@ -94,7 +94,7 @@ def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) ->
         user_functions.check(
             f"reward {settings.task.reward}", lambda: jax.eval_shape(first_reward), rank=0
         )
-    if settings.network.rate_margin > 0:
+    if settings.network.rate_margin > 0 and settings.task.actions == "discrete":
         _check_that_torques_are_left(settings, craft)
     groups = len(settings.task.frameskips)
     return train_state.Setup(env, policy(settings, craft), settings, groups, num_devices)
@@ -151,10 +151,13 @@ def num_devices(settings: Settings) -> int:
 def env_params(setup: train_state.Setup) -> simulator.EnvParams:
     """The spacecraft's parameters, but for the cap on the episode's length.
 
-    With several control rates, each group of spacecraft has its own.
+    Where actions are continuous, nothing masks them, and the rate limit is the margin of it that
+    the mask would keep: a policy that learns to stay below it has room for its errors. With several control rates, each group of spacecraft has its own.
     """
     settings, params = setup.settings, setup.env.default_params
-    craft = setup.env.spacecraft
+    craft, margin = setup.env.spacecraft, settings.network.rate_margin
+    if margin > 0 and settings.task.actions == "continuous":
+        params = params.replace(rate_limit=margin * params.rate_limit)
     longest = [craft.max_steps(frameskip) for frameskip in settings.task.frameskips]
     limits = np.minimum(longest, settings.task.max_episode_steps).astype(np.int32)
     if setup.groups == 1:
