@@ -9,6 +9,8 @@ from commands import eval_script, one_line_error, train_script
 
 import attjax
 from attjax import AttitudeEnv
+from attjax.config import presets
+from attjax.runs import build
 
 FLAGS = [
     "--preset=continuous", "--num-envs=16", "--rollout-length=8", "--minibatch-size=32",
@@ -95,10 +97,14 @@ def test_bad_evaluation_arguments(folder, capsys, flags, named):
     assert named in one_line_error(eval_script.main, flags, capsys)
 
 
-def test_the_mask_is_one_of_discrete_actions(tmp_path, capsys):
-    flags = [*FLAGS, "--checkpoint", str(tmp_path / "ckpt"), "--rate-margin=0.9"]
-    error = one_line_error(train_script.main, flags, capsys)
-    assert "rate_margin is 0.9; with continuous actions it must be 0" in error
+def test_training_episodes_end_at_the_margin_of_the_rate_limit():
+    """Those of discrete actions, which are masked, do not; nor does a policy's evaluation."""
+    for preset, margin, expected in (
+        ("continuous", 0.96, 0.48), ("continuous", 0.0, 0.5), ("precise", 0.96, 0.5)
+    ):  # fmt: skip
+        setup = build.setup(presets.PRESETS[preset].replace(rate_margin=margin))
+        assert float(build.env_params(setup).rate_limit) == pytest.approx(expected)
+        assert float(setup.env.default_params.rate_limit) == 0.5
 
 
 def test_torques_along_no_body_axis_are_one_line(folder, tmp_path, capsys):

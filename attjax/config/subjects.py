@@ -85,8 +85,8 @@ class Network(Checked):
         before="orthogonal",
     )
     rate_margin: float = _networks(
-        "mask actions after which coasting would pass this fraction of the rate limit; end training "
-        "episodes there, if actions are continuous; 0: neither",
+        "mask actions after which coasting would pass this fraction of the rate limit; where they "
+        "are continuous, end training episodes there; 0: neither",
         low=0,
         high=1,
     )

@@ -152,7 +152,8 @@ def env_params(setup: train_state.Setup) -> simulator.EnvParams:
     """The spacecraft's parameters, but for the cap on the episode's length.
 
     Where actions are continuous, nothing masks them, and the rate limit is the margin of it that
-    the mask would keep: a policy that learns to stay below it has room for its errors. With several control rates, each group of spacecraft has its own.
+    the mask would keep: a policy that learns to stay below it has room for its errors. With
+    several control rates, each group of spacecraft has its own.
     """
     settings, params = setup.settings, setup.env.default_params
     craft, margin = setup.env.spacecraft, settings.network.rate_margin
