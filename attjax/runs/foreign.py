@@ -3,12 +3,14 @@
 Evaluation takes them as they are; ``train.py --resume`` cannot go on with them.
 """
 
+import math
 from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import ArrayLike
 
+from attjax.ppo.distributions import LEAST_STD
 from attjax.ppo.train_state import Learner
 
 
@@ -18,16 +20,19 @@ def gaussian_params(layers: Sequence[tuple[ArrayLike, ArrayLike]], std: float) -
     Args:
         layers: of the actor, from inputs to outputs, ReLU between them: kernel (inputs, outputs)
             and bias (outputs,). The last has 3 outputs, whose tanh are fractions of the torques.
-        std: standard deviation of the noise that it explored with, the same for each axis.
+        std: standard deviation of the noise that it explored with, the same for each axis;
+            above LEAST_STD and below 1.
 
     Example:
-        >>> params = gaussian_params([(jnp.ones((11, 3)), jnp.zeros(3))], std=0.1)["params"]
-        >>> params["Dense_0"]["kernel"].shape, params["Dense_0"]["bias"].round(1).tolist()[2:4]
-        ((11, 6), [0.0, -2.299999952316284])
+        >>> params = gaussian_params([(jnp.ones((11, 3)), jnp.zeros(3))], std=0.5)["params"]
+        >>> params["Dense_0"]["kernel"].shape, params["Dense_0"]["bias"].shape
+        ((11, 6), (6,))
     """
     *hidden, (kernel, bias) = [tuple(map(jnp.asarray, layer)) for layer in layers]
     widened = jnp.pad(kernel, ((0, 0), (0, 3)))
-    last = widened, jnp.concatenate([bias, jnp.full_like(bias, jnp.log(std))])
+    share = std - LEAST_STD
+    deviation = jnp.full_like(bias, math.log(share / (1 - share)))
+    last = widened, jnp.concatenate([bias, deviation])
     return {
         "params": {
             f"Dense_{index}": {"kernel": kernel, "bias": bias}
