@@ -175,7 +175,7 @@ def one_argument(observation): return observation
         (
             "reward",
             "best",
-            "it must be one of paper, logarithmic, authors, authors-continuous, or module:function",
+            "be one of paper, logarithmic, binary, authors, authors-continuous, or module:function",
         ),
         ("features", "mine.scalar", "or module:function"),
     ],

@@ -13,6 +13,12 @@ DEFAULT_PRESET = "precise"
 CUSTOM = "custom"
 """The preset's name in a run whose settings were all given."""
 
+FOREIGN = {"td3": "TD3"}
+"""Other learners, by the preset's name in a run that keeps a policy of theirs.
+
+Of its settings only task and network are the policy's; those of PPO say nothing.
+"""
+
 
 @dataclasses.dataclass(frozen=True)
 class Config:
@@ -62,8 +68,12 @@ def lengthened(config: Config, given: dict) -> Config:
         given: preset, seed, spacecraft and settings, by name, that it is to be continued with.
 
     Raises:
-        UserError: one of them is not the run's, or the total is smaller.
+        UserError: one of them is not the run's, the total is smaller, or the run is no PPO's.
     """
+    if config.preset in FOREIGN:
+        raise UserError(
+            f"--resume goes on with runs of PPO; this one is of {FOREIGN[config.preset]}"
+        )
     before = config.settings.ppo.total_steps
     total = given.get("total_steps", before)
     run = vars(config) | config.settings.flat | {"total_steps": total}

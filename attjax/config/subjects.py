@@ -22,9 +22,10 @@ class Task(Checked):
         most=64,
     )
     reward: str = _task(
-        "Eq. 12-13 with terminal rewards, -log10 of the error angle, Eq. 12-13 as in the authors' "
-        "public code without and with a price on torque, or module:function",
-        choices=("paper", "logarithmic", "authors", "authors-continuous"),
+        "Eq. 12-13 with terminal rewards, -log10 of the error angle, Eq. 12-13 without the "
+        "exponential, as in the authors' public code without and with a price on torque, or "
+        "module:function",
+        choices=("paper", "logarithmic", "binary", "authors", "authors-continuous"),
         or_function=True,
     )
     reward_scale: float = _task("factor on the reward the learner sees", above=0)

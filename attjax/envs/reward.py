@@ -85,9 +85,14 @@ def paper_reward(transition: Transition) -> Float[Array, ""]:
         9.0
     """
     angle = quaternions.error_angle(transition.next_quaternion)
-    inside = angle <= transition.goal_angle
     improved = scalar_part_increased(transition.quaternion, transition.next_quaternion)
     shaped = jnp.exp(-angle / (0.14 * 2 * jnp.pi)) - jnp.where(improved, 0.0, 1.0)
+    return _with_goal(transition, angle, shaped)
+
+
+def _with_goal(transition, angle, shaped):
+    """A shaped reward (Eq. 12) with the bonus of Eq. 13 and the terminal rewards."""
+    inside = angle <= transition.goal_angle
     reward = shaped + jnp.where(inside, 9.0, 0.0)
     reward = jnp.where(transition.truncated, jnp.where(inside, TERMINAL_BONUS, 0.0), reward)
     return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
@@ -109,6 +114,24 @@ def logarithmic_reward(transition: Transition) -> Float[Array, ""]:
     angle = quaternions.error_angle(transition.next_quaternion)
     reward = -jnp.log10(angle + 1e-6) * transition.control_period / REFERENCE_PERIOD
     return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
+
+
+def binary_reward(transition: Transition) -> Float[Array, ""]:
+    """Eq. 12 and 13 without the exponential: 0 where q_s rose, −1 elsewhere, +9 within the goal.
+
+    Our reading of what the paper says of its predecessor [13], whose reward it calls binary and
+    extends by the exponential; terminal rewards as in :func:`paper_reward`.
+
+    Example:
+        >>> goal = jnp.array([0.0, 0.0, 0.0, 1.0])
+        >>> rest = jnp.zeros(3)
+        >>> at_rest = Transition(goal, goal, rest, False, False, 0.00436, 0.0875, rest)
+        >>> binary_reward(at_rest).item()
+        8.0
+    """
+    angle = quaternions.error_angle(transition.next_quaternion)
+    improved = scalar_part_increased(transition.quaternion, transition.next_quaternion)
+    return _with_goal(transition, angle, jnp.where(improved, 0.0, -1.0))
 
 
 def authors_reward(transition: Transition) -> Float[Array, ""]:
@@ -146,6 +169,7 @@ def authors_continuous_reward(transition: Transition) -> Float[Array, ""]:
 REWARDS: dict[str, Callable[[Transition], Float[Array, ""]]] = {
     "paper": paper_reward,
     "logarithmic": logarithmic_reward,
+    "binary": binary_reward,
     "authors": authors_reward,
     "authors-continuous": authors_continuous_reward,
 }

@@ -4,7 +4,7 @@ import dataclasses
 
 import attjax
 from attjax.config import presets
-from attjax.config.run import Config
+from attjax.config.run import FOREIGN, Config
 from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
 
 
@@ -36,6 +36,8 @@ def of_run(config: Config, update: int, newest: int) -> Origin:
 
 def _changes(config):
     """The settings in which a run differs from its preset."""
+    if config.preset in FOREIGN:
+        return f" (learned by {FOREIGN[config.preset]}, no PPO)"
     preset = presets.PRESETS.get(config.preset)
     if preset is None:
         return " (unknown)"

@@ -10,6 +10,7 @@ from attjax.dynamics import quaternion as quaternions
 from attjax.envs.reward import (
     REWARDS,
     Transition,
+    binary_reward,
     logarithmic_reward,
     paper_reward,
     scalar_part_increased,
@@ -25,13 +26,13 @@ def quaternion(degrees, axis=(0.6, -0.48, 0.64)):
     return np.array([*(np.array(axis) * np.sin(half)), np.cos(half)])
 
 
-def expected_paper_reward(before_deg, after_deg, terminated, truncated):
+def expected_reward(before_deg, after_deg, terminated, truncated, exponential=True):
     """Eq. 12-13 from the angles themselves: q_s = cos(φ/2) falls with φ on [0°, 360°]."""
     if terminated:
         return -50.0
     if truncated:
         return 50.0 if after_deg <= 0.25 else 0.0
-    reward = np.exp(-np.deg2rad(after_deg) / (0.14 * 2 * np.pi))
+    reward = np.exp(-np.deg2rad(after_deg) / (0.14 * 2 * np.pi)) if exponential else 0.0
     if not after_deg < before_deg:
         reward -= 1
     return reward + 9 if after_deg <= 0.25 else reward
@@ -71,15 +72,17 @@ ANGLES = [
 ]
 
 
+@pytest.mark.parametrize("reward", [paper_reward, binary_reward])
 @pytest.mark.parametrize("terminated, truncated", [(0, 0), (0, 1), (1, 0), (1, 1)])
-def test_paper_reward_in_every_branch(terminated, truncated):
+def test_paper_reward_with_and_without_the_exponential(reward, terminated, truncated):
     for after in ANGLES:
         for ratio in (0.99, 0.9999, 1.0001, 1.01):
             before = after + (ratio - 1) * min(after, 360 - after)
-            ours = paper_reward(
+            ours = reward(
                 transition(quaternion(before), quaternion(after), bool(terminated), bool(truncated))
             )
-            expected = expected_paper_reward(before, after, terminated, truncated)
+            exponential = reward is paper_reward
+            expected = expected_reward(before, after, terminated, truncated, exponential)
             assert float(ours) == pytest.approx(expected, abs=2e-6), (before, after)
 
 
@@ -158,6 +161,13 @@ def test_improvement_is_that_of_the_rotation_not_of_the_length():
             closer = scalar_part_increased(jnp.array(scale * far), jnp.array(near))
             farther = scalar_part_increased(jnp.array(scale * near), jnp.array(far))
             assert (closer, farther) == ((True, False) if sign > 0 else (False, True))
+
+
+def test_the_binary_reward_is_of_integers_before_the_end():
+    """Farther, closer, closer and inside, farther but inside."""
+    angles = [(10, 11), (11, 10), (0.3, 0.2), (0.1, 0.2)]
+    ours = [float(binary_reward(transition(*map(quaternion, pair)))) for pair in angles]
+    assert ours == [-1, 0, 9, 8]
 
 
 @pytest.mark.parametrize("degrees", [10, 90, 180, 270, 350])
