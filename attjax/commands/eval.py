@@ -213,9 +213,9 @@ def _env(arguments, config, spacecraft):
     # Imported late: with it, --help and errors in the arguments would take seconds.
     from attjax.runs import build
 
-    rules = build.rules(config.settings.task) if config else {"actions": arguments.actions}
-    if rules["actions"] is None:
-        rules = {}
+    rules = {"actions": arguments.actions or "discrete"}
+    if config:
+        rules = build.rules(config.settings.task)
     return build.environment(arguments.frameskip, spacecraft, rules)
 
 
