@@ -33,7 +33,9 @@ RECIPES = {
     "paper-fast, multiscale 64-64": [
         "--preset", "paper-fast", "--features", "multiscale", "--hidden-sizes", "64,64",
         "--num-envs", "256", "--rollout-length", "64", "--minibatch-size", "1024",
-        "--learning-rate", "2e-3", "--total-steps", "3000000",
+        "--learning-rate", "2e-3", "--total-steps", "3000000", "--passes", "4",
+        "--gae-lambda", "0.95", "--greedy-share", "0", "--near-goal-share", "0",
+        "--rate-margin", "0", "--time-limit-terminates",
     ],
     "paper": ["--preset", "paper"],
 }  # fmt: skip

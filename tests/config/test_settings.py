@@ -20,7 +20,7 @@ def test_paper_presets_hold_what_the_paper_names():
         assert (ppo.learning_rate, ppo.final_learning_rate) == (3e-4, 1e-5)
         assert (ppo.clip, ppo.entropy_coefficient) == (0.2, 1e-4)
         assert (task.frameskips, task.reward, network.features) == ((20,), "paper", "state")
-        assert task.time_limit_terminates and network.rate_margin == 0
+    assert PAPER.task.time_limit_terminates and PAPER.network.rate_margin == 0
     ppo = PAPER.ppo
     assert (ppo.num_envs, ppo.rollout_length, ppo.minibatch_size) == (30, 500, 128)
     assert ppo.num_updates == 4340 and ppo.gae_lambda == 1

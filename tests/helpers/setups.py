@@ -22,6 +22,16 @@ SMALL = {
     "updates_per_block": 1,
 }
 
+PLAIN = presets.PAPER_FAST.replace(
+    gae_lambda=0.95,
+    passes=4,
+    greedy_share=0.0,
+    near_goal_share=0.0,
+    rate_margin=0.0,
+    time_limit_terminates=True,
+)
+"""PPO without what helps on slews."""
+
 SETTINGS = presets.PRECISE.replace(
     frameskips=(5, 20),
     num_envs=8,
@@ -33,7 +43,7 @@ SETTINGS = presets.PRECISE.replace(
 CONFIG = Config("precise", 3, SETTINGS)
 
 
-def settings(updates, preset=presets.PAPER_FAST, **overrides):
+def settings(updates, preset=PLAIN, **overrides):
     values = SMALL | overrides
     steps = values["num_envs"] * values["rollout_length"] * updates
     return preset.replace(total_steps=steps, **values)

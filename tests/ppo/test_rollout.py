@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from setups import fly, small_attitude_setup
+from setups import PLAIN, fly, small_attitude_setup
 
 import attjax
 from attjax import ppo
@@ -162,9 +162,7 @@ def test_devices_hold_the_control_rates_of_their_part():
 @pytest.mark.parametrize("scale", [1.0, 0.005])
 def test_the_learner_sees_the_reward_times_its_scale(scale):
     """The score of an episode's first step is its reward; both are Eq. 12-13 here."""
-    setup = small_attitude_setup(
-        1, presets.PAPER_FAST, frameskips=(20,), rollout_length=2, reward_scale=scale
-    )
+    setup = small_attitude_setup(1, PLAIN, frameskips=(20,), rollout_length=2, reward_scale=scale)
     env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
     _, steps = fly(setup, env_params, state)

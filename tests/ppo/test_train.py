@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from jax.sharding import PartitionSpec
 from probes import Probe
-from setups import fly, settings, small_attitude_setup
+from setups import PLAIN, fly, settings, small_attitude_setup
 
 from attjax import AttitudeEnv, ppo, sharding
 from attjax.config import presets
@@ -95,7 +95,7 @@ def test_value_does_not_bootstrap_over_a_termination():
 def test_a_short_training_improves_the_return():
     setup = small_attitude_setup(
         120,
-        presets.PAPER_FAST,
+        PLAIN,
         num_envs=128,
         rollout_length=64,
         reward_scale=0.01,
