@@ -88,8 +88,20 @@ FAULTS = {
         "return learner.replace(key=key), steps", "return learner, steps", LEARNING,
     ),
     "same key for all steps of a rollout": (
-        "attjax/ppo/rollout.py", "random = (uniform, jax.random.split(flight_key, (length, 2)))",
-        "random = (0 * uniform + uniform[0], jax.random.split(flight_key, (length, 2)))", LEARNING,
+        "attjax/ppo/rollout.py", "random = (noise, jax.random.split(flight_key, (length, 2)))",
+        "random = (0 * noise + noise[0], jax.random.split(flight_key, (length, 2)))", LEARNING,
+    ),
+    "density of a Gaussian without its scale": (
+        "attjax/ppo/distributions.py", "deviation**2 / 2 + self.log_std + math.log",
+        "deviation**2 / 2 + math.log", ["tests/ppo/test_distributions.py"],
+    ),
+    "a Gaussian's greedy spacecraft explore": (
+        "attjax/ppo/distributions.py", "jnp.where(np.asarray(greedy)[..., None], 0.0, noise)",
+        "noise", ["tests/ppo/test_distributions.py"],
+    ),
+    "continuous training without its margin": (
+        "attjax/runs/build.py", "rate_limit=margin * params.rate_limit",
+        "rate_limit=params.rate_limit", ["tests/test_continuous_runs.py"],
     ),
     "reset state cached": (
         "attjax/envs/attitude.py", "fresh_observation, fresh_state = self.reset_env(key, params)",
