@@ -1,4 +1,6 @@
 # ruff: noqa: E402
+from pathlib import Path
+
 import array_checks
 
 array_checks.install()  # before attjax is imported, here or by what follows
@@ -17,6 +19,19 @@ from attjax.runs import trainer
 
 jax.config.update("jax_num_cpu_devices", 2)  # what is shared out over devices is tested on two
 jax.config.update("jax_legacy_prng_key", "error")  # typed keys throughout
+
+
+MOST_MAPS = 20_000
+"""Memory maps of a process: a training program takes 1,300; beyond Linux's 65,530 XLA crashes."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_memory_maps():
+    """Forget the compiled programs of earlier modules before there are too many."""
+    yield
+    maps = Path("/proc/self/maps")
+    if maps.exists() and maps.read_bytes().count(b"\n") > MOST_MAPS:
+        jax.clear_caches()
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ import attjax
 from attjax import AttitudeEnv
 from attjax.config import presets
 from attjax.runs import build
+from attjax.runs import folder as run_folder
 
 FLAGS = [
     "--preset=continuous", "--num-envs=16", "--rollout-length=8", "--minibatch-size=32",
@@ -40,13 +41,12 @@ def judged(capsys, *flags):
     return json.loads(capsys.readouterr().out)
 
 
-def test_training_from_python_gives_a_policy_of_fractions():
-    small = {"num_envs": 16, "rollout_length": 8, "minibatch_size": 32, "hidden_sizes": (16,)}
-    run = attjax.train("continuous", total_steps=256, **small)
-    assert run.env.actions == "continuous" and np.all(np.isfinite(run.metrics["entropy"]))
-    observation = run.env.reset(jax.random.key(0))[0]
-    action = run.policy(observation, run.env.context(run.env.default_params))
+def test_its_policy_gives_fractions(folder):
+    env = AttitudeEnv(frameskip=5, actions="continuous")
+    observation = env.reset(jax.random.key(0))[0]
+    action = attjax.load_policy(folder)(observation, env.context(env.default_params))
     assert action.shape == (3,) and np.all(np.abs(action) < 1) and np.any(action != 0)
+    assert build.of_config(run_folder.read_config(folder)).env.actions == "continuous"
 
 
 def test_eval_flies_what_load_policy_flies(folder, capsys):
