@@ -10,6 +10,9 @@ from typing import Any
 
 LARGEST = 1e30
 
+ACTIONS = ("discrete", "continuous")
+"""How a spacecraft is steered: by one of its torques, or by any about the three axes at once."""
+
 
 def plain(value: Any) -> Any:
     """Tuples for lists and arrays, Python's numbers for NumPy's: they can be hashed and written."""

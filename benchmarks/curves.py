@@ -13,6 +13,7 @@ import common
 import numpy as np
 
 from attjax import canvas, errors
+from attjax.config import command_line
 from attjax.runs import folder as run_folder
 from attjax.runs import metrics_file
 from attjax.runs.learning_curve import PAPERS_PLATEAU
@@ -23,7 +24,7 @@ POINTS = 100
 
 def parse_arguments(argv=None):
     """The command line."""
-    parser = common.parser(__doc__)
+    parser = command_line.Parser(description=__doc__)
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folder of a run")
     labels_help = "what the figure calls each run (default: its folder's name)"
     parser.add_argument("--labels", nargs="+", metavar="TEXT", help=labels_help)

@@ -13,6 +13,7 @@ from attjax.commands import evaluation_output
 from attjax.config import command_line, fields, toml
 from attjax.runs import folder as run_folder
 from attjax.spacecraft import INTEGRATION_STEP, LM50, MOST_DURATION
+from attjax.values import ACTIONS
 
 POLICY = "policy"
 STDOUT = Path("-")
@@ -57,7 +58,7 @@ def _add_who(group):
         "how classical controllers without checkpoint act: by one of the torques (default), or by "
         "any about the three axes at once; a policy acts as it was trained to"
     )
-    group.add_argument("--actions", choices=("discrete", "continuous"), help=actions_help)
+    group.add_argument("--actions", choices=ACTIONS, help=actions_help)
 
 
 def _add_conditions(group):

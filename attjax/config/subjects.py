@@ -7,6 +7,7 @@ import dataclasses
 import functools
 
 from attjax.config.fields import FRAMESKIP, GROUPS, Checked, setting
+from attjax.values import ACTIONS
 
 _run, _task, _networks, _ppo, _logging = (functools.partial(setting, group=g) for g in GROUPS)
 
@@ -55,7 +56,7 @@ class Task(Checked):
     )
     actions: str = _task(
         "choose one of the torques, or any about the three axes at once up to the largest",
-        choices=("discrete", "continuous"),
+        choices=ACTIONS,
         before="discrete",
     )
     observes_quaternion_rate: bool = _task(

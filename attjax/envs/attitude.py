@@ -17,9 +17,7 @@ from attjax.envs.keys import observation_key, steps_key
 from attjax.envs.reward import Transition, paper_reward
 from attjax.envs.simulator import EnvParams, EnvState
 from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
-from attjax.values import check_choice, check_share, check_truth, integer
-
-ACTIONS = ("discrete", "continuous")
+from attjax.values import ACTIONS, check_choice, check_share, check_truth, integer
 
 
 @dataclasses.dataclass(frozen=True)

@@ -85,15 +85,14 @@ def paper_reward(transition: Transition) -> Float[Array, ""]:
         9.0
     """
     angle = quaternions.error_angle(transition.next_quaternion)
-    improved = scalar_part_increased(transition.quaternion, transition.next_quaternion)
-    shaped = jnp.exp(-angle / (0.14 * 2 * jnp.pi)) - jnp.where(improved, 0.0, 1.0)
-    return _with_goal(transition, angle, shaped)
+    return _shaped(transition, angle, jnp.exp(-angle / (0.14 * 2 * jnp.pi)))
 
 
-def _with_goal(transition, angle, shaped):
-    """A shaped reward (Eq. 12) with the bonus of Eq. 13 and the terminal rewards."""
+def _shaped(transition, angle, closeness):
+    """Eq. 12 and 13 with what is said there of closeness, and the terminal rewards."""
     inside = angle <= transition.goal_angle
-    reward = shaped + jnp.where(inside, 9.0, 0.0)
+    improved = scalar_part_increased(transition.quaternion, transition.next_quaternion)
+    reward = closeness - jnp.where(improved, 0.0, 1.0) + jnp.where(inside, 9.0, 0.0)
     reward = jnp.where(transition.truncated, jnp.where(inside, TERMINAL_BONUS, 0.0), reward)
     return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
 
@@ -129,9 +128,7 @@ def binary_reward(transition: Transition) -> Float[Array, ""]:
         >>> binary_reward(at_rest).item()
         8.0
     """
-    angle = quaternions.error_angle(transition.next_quaternion)
-    improved = scalar_part_increased(transition.quaternion, transition.next_quaternion)
-    return _with_goal(transition, angle, jnp.where(improved, 0.0, -1.0))
+    return _shaped(transition, quaternions.error_angle(transition.next_quaternion), 0.0)
 
 
 def authors_reward(transition: Transition) -> Float[Array, ""]:

@@ -1,7 +1,6 @@
 """Continuous actions: torques about the three axes of the body frame, the mean of a Gaussian."""
 
 import dataclasses
-import functools
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +9,7 @@ import numpy as np
 from attjax.envs import observation as observations
 from attjax.envs import simulator
 from attjax.export import c_text
-from attjax.export.kind import NOTHING_KEEPS, CDecision, Kind, States
+from attjax.export.kind import NOTHING_KEEPS, CDecision, Kind, States, decide_all
 
 ROUNDINGS = 8
 """How many times JAX's own error in float32 an export's torque may differ from JAX's.
@@ -61,13 +60,8 @@ def _decide(flight, quaternion, angular_velocity):
     return simulator.applied_torque(action, flight.env.default_params)
 
 
-@functools.partial(jax.jit, static_argnums=0)
-def _decide_all(flight, quaternion, angular_velocity):
-    return jax.vmap(functools.partial(_decide, flight))(quaternion, angular_velocity)
-
-
 def _torques(flight, quaternion, angular_velocity):
-    torque = np.asarray(_decide_all(flight, quaternion, angular_velocity))
+    torque = np.asarray(decide_all(flight, quaternion, angular_velocity))
     error = np.nanmax(np.abs(torque - _in_float64(flight, quaternion, angular_velocity)))
     unit = np.finfo(np.float32).eps / 2 * np.max(_largest_torques(flight))
     return Torques(quaternion, angular_velocity, torque, float(ROUNDINGS * max(error, unit)))
@@ -78,7 +72,7 @@ def _in_float64(flight, *state):
     with jax.enable_x64(True):
         params = jax.tree.map(lambda x: jnp.asarray(x, float), flight.params)
         double = dataclasses.replace(flight, params=params)
-        return np.asarray(_decide_all(double, *(np.asarray(x, float) for x in state)))
+        return np.asarray(decide_all(double, *(np.asarray(x, float) for x in state)))
 
 
 def _largest_torques(flight):

@@ -1,7 +1,6 @@
 """Discrete actions: of the torques of the table the best that the rate mask allows."""
 
 import dataclasses
-import functools
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +9,7 @@ import numpy as np
 from attjax.control import assurance
 from attjax.envs import observation as observations
 from attjax.export import c_text
-from attjax.export.kind import NOTHING_KEEPS, CDecision, Kind, States
+from attjax.export.kind import NOTHING_KEEPS, CDecision, Kind, States, decide_all
 from attjax.ppo import networks
 
 TIE = 1e-4
@@ -60,15 +59,10 @@ def _decide(flight, quaternion, angular_velocity):
     return action.astype(jnp.int32), logits
 
 
-@functools.partial(jax.jit, static_argnums=0)
-def _decide_all(flight, quaternion, angular_velocity):
-    return jax.vmap(functools.partial(_decide, flight))(quaternion, angular_velocity)
-
-
 def _decisions(flight, quaternion, angular_velocity):
-    action, logits = map(np.asarray, _decide_all(flight, quaternion, angular_velocity))
+    action, logits = map(np.asarray, decide_all(flight, quaternion, angular_velocity))
     nearby = [
-        np.asarray(_decide_all(flight, quaternion, angular_velocity * np.float32(1 + change))[1])
+        np.asarray(decide_all(flight, quaternion, angular_velocity * np.float32(1 + change))[1])
         for change in (-MASK_ROUNDING, MASK_ROUNDING)
     ]
     masked = logits == networks.MASKED_LOGIT

@@ -1,9 +1,13 @@
 """What an export must know of a kind of action: discrete.py and continuous.py tell it."""
 
+import abc
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import chex
+import jax
 import numpy as np
 
 NOTHING_KEEPS = "there is no mask; nothing keeps it but what was learned"
@@ -11,7 +15,7 @@ NOTHING_KEEPS = "there is no mask; nothing keeps it but what was learned"
 
 
 @dataclasses.dataclass(frozen=True)
-class States:
+class States(abc.ABC):
     """States at which a policy decides.
 
     Attributes:
@@ -22,18 +26,18 @@ class States:
     angular_velocity: np.ndarray
 
     @property
+    @abc.abstractmethod
     def comparable(self) -> np.ndarray:
         """(states,) bool, where an export must decide as JAX does."""
-        raise NotImplementedError
 
     @property
+    @abc.abstractmethod
     def c_values(self) -> Mapping[str, object]:
         """What fills in the test program."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def c_decision(self, state: int) -> str:
         """The decision at one of the states, as C reads it."""
-        raise NotImplementedError
 
 
 class CDecision(NamedTuple):
@@ -84,3 +88,10 @@ class Kind(NamedTuple):
     c: Callable[..., CDecision]
     onnx: Callable[..., None]
     results: Callable[..., Mapping[str, str]]
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def decide_all(flight: Any, quaternion: chex.Array, angular_velocity: chex.Array) -> chex.ArrayTree:
+    """What a flight policy's kind decides at many states, (states, 4) and (states, 3)."""
+    decide = functools.partial(flight.kind.decide, flight)
+    return jax.vmap(decide)(quaternion, angular_velocity)

@@ -28,6 +28,11 @@ class Categorical:
 
     log_probabilities: chex.Array
 
+    @classmethod
+    def of(cls, outputs: chex.Array) -> "Categorical":
+        """Of a network's (actions, samples) outputs: LogSoftmax (Table 3)."""
+        return cls(nn.log_softmax(outputs, axis=0))
+
     @staticmethod
     def noise(key: chex.PRNGKey, shape: tuple[int, ...], dtype: jnp.dtype) -> chex.Array:
         """What :meth:`draw` needs: one random number from [0, 1) a sample.

@@ -154,11 +154,8 @@ class Policy:
         return jnp.where(inputs.allowed.T, outputs, MASKED_LOGIT)
 
     def distribution(self, params: dict, inputs: Inputs) -> Categorical | Gaussian:
-        """Of the actions, by LogSoftmax (Table 3) or as Gaussian; of (samples, ...) inputs."""
-        outputs = self.outputs(params, inputs)
-        if self.actions == "continuous":
-            return Gaussian.of(outputs)
-        return Categorical(nn.log_softmax(outputs, axis=0))
+        """What the actions are drawn from, of (samples, ...) inputs."""
+        return self.distribution_family.of(self.outputs(params, inputs))
 
     def value(self, params: dict, features: chex.Array) -> chex.Array:
         """(samples,) V(s) of (samples, features)."""
