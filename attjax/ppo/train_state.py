@@ -7,7 +7,6 @@ from typing import Any
 
 import chex
 import jax
-import jax.flatten_util
 import jax.numpy as jnp
 import numpy as np
 import optax
@@ -97,11 +96,7 @@ LEARNER_SPECS = Learner(SHARED, SHARED, SPLIT, SPLIT, SPLIT, SPLIT, SHARED, SHAR
 
 
 def optimizer(settings: PPO) -> optax.GradientTransformation:
-    """Adam, annealed linearly over the whole run, with optional gradient clipping.
-
-    It is given a network's gradient as one vector: dozens of small arrays cost more to start on
-    than to work through.
-    """
+    """A network's Adam, annealed linearly over the whole run, with optional gradient clipping."""
     clip = optax.identity()
     if settings.max_gradient_norm > 0:
         clip = optax.clip_by_global_norm(settings.max_gradient_norm)
@@ -144,9 +139,7 @@ def _init_on_device(setup, env_params, key):
     adam = optimizer(settings.ppo)
     return Learner(
         params=params,
-        optimizer={
-            name: adam.init(jax.flatten_util.ravel_pytree(p)[0]) for name, p in params.items()
-        },
+        optimizer={name: adam.init(network) for name, network in params.items()},
         states=states,
         observation=observation,
         score=jnp.zeros(setup.envs_per_device, observation.dtype),

@@ -18,7 +18,7 @@ import orbax.checkpoint as ocp
 
 from attjax.ppo.networks import Policy
 from attjax.ppo.train_state import Learner
-from attjax.runs import belongings, build, quiet
+from attjax.runs import belongings, build, earlier, quiet
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
 from attjax.runs.plain_path import plain
@@ -159,7 +159,8 @@ def restore_learner(folder: Path, template: Learner) -> Learner:
     Raises:
         FolderError: the folder holds no checkpoint, an unreadable one or one of another run.
     """
-    restored = _restore(folder, latest(folder), "learner", _storable(template))
+    restore = functools.partial(_restore, folder, latest(folder), "learner")
+    restored = earlier.restored(restore, _storable(template))
     implementation = jax.random.key_impl(template.key)
     return restored.replace(key=jax.random.wrap_key_data(restored.key, impl=implementation))
 

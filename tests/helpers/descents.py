@@ -5,7 +5,6 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.flatten_util import ravel_pytree
 from jax.sharding import PartitionSpec
 from setups import small_attitude_setup
 
@@ -56,7 +55,7 @@ def new_learner(setup, update=0):
     none = jnp.zeros(setup.settings.ppo.num_envs)
     return train_state.Learner(
         params=params,
-        optimizer={name: adam.init(ravel_pytree(x)[0]) for name, x in params.items()},
+        optimizer={name: adam.init(network) for name, network in params.items()},
         states=none,
         observation=none,
         score=none,

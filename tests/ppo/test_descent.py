@@ -63,8 +63,9 @@ def test_a_gradient_step_is_adams_along_the_loss_written_out(x64, normalize, max
         if max_norm:
             gradient = gradient * max_norm / norm
         adam = after.optimizer[name][1][0]
-        np.testing.assert_allclose(adam.mu, 0.1 * gradient, rtol=1e-6, atol=1e-12)
-        np.testing.assert_allclose(adam.nu, 0.001 * gradient**2, rtol=1e-6, atol=1e-15)
+        first, second = (ravel_pytree(x)[0] for x in (adam.mu, adam.nu))
+        np.testing.assert_allclose(first, 0.1 * gradient, rtol=1e-6, atol=1e-12)
+        np.testing.assert_allclose(second, 0.001 * gradient**2, rtol=1e-6, atol=1e-15)
         moved = [ravel_pytree(x.params[name])[0] for x in (before, after)]
         step = setup.settings.ppo.learning_rate * gradient / (abs(gradient) + 1e-8)
         np.testing.assert_allclose(moved[0] - moved[1], step, rtol=1e-6, atol=1e-12)

@@ -8,7 +8,7 @@ from setups import CONFIG, SETTINGS
 
 from attjax import AttitudeEnv, ppo
 from attjax.ppo import train_state
-from attjax.runs import build, checkpoint
+from attjax.runs import build, checkpoint, earlier
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
 
@@ -45,6 +45,26 @@ def test_restored_learner_is_the_saved_one_and_goes_on_bitwise(trained):
         if jax.dtypes.issubdtype(a.dtype, jax.dtypes.prng_key):
             a, b = map(jax.random.key_data, (a, b))
         np.testing.assert_array_equal(a, b)
+
+
+def test_a_learner_of_an_earlier_version_goes_on(trained, tmp_path):
+    """One vector a network were Adam's moments then."""
+    _, setup, env_params, state = trained
+    run_folder.create(tmp_path, CONFIG, overwrite=False)
+    old = earlier.flat(state)
+    biases = state.params["value"]["params"]["Dense_0"]["bias"].size
+    moments = state.optimizer["value"][1][0].mu["params"]["Dense_0"]
+    first = np.asarray(old.optimizer["value"][1][0].mu)
+    np.testing.assert_array_equal(first[:biases], moments["bias"])
+    kernel = first[biases : biases + moments["kernel"].size]
+    np.testing.assert_array_equal(kernel, moments["kernel"].ravel())
+    with checkpoint.Saver(tmp_path) as saver:
+        saver.save(old)
+    template = train_state.init(setup, env_params, jax.random.key(99))
+    restored = checkpoint.restore_learner(tmp_path, template)
+    assert restored.update == 2
+    jax.tree.map(np.testing.assert_array_equal, restored.params, state.params)
+    jax.tree.map(np.testing.assert_array_equal, restored.optimizer, state.optimizer)
 
 
 def test_a_run_goes_on_with_another_number_of_devices(trained):
