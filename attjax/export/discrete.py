@@ -142,7 +142,7 @@ def _c_masked(decision, mask, margin):
         kept_rate=kept_rate,
         parts=decision.parts | {"allow": "discrete/allow_rate_mask.c"},
         values=decision.values | values,
-        constants=decision.constants + mask.form.size + mask.impulse.size + mask.own_gain.size + 1,
+        constants=sum(x.size for x in jax.tree.leaves(mask)),  # the torque table is among them
         multiply_adds=9 + 3 + 3 * actions,
         comparisons=decision.comparisons + 2 * actions,
         other=3 * actions,

@@ -129,7 +129,9 @@ def test_the_c_test_program_notices_what_is_wrong(tmp_path, wrong):
 
 
 @needs_compiler
-@pytest.mark.parametrize("case", [("state", (24, 8), 0.0), ("multiscale", (8, 8, 8), 0.0)])
+@pytest.mark.parametrize(
+    "case", [("state", (24, 8), 0.0), ("multiscale", (8, 8, 8), 0.0), ("state", (8,), 0.99)]
+)
 def test_constants_and_stack_are_as_the_comment_says(tmp_path, case):
     """All the constants of the C source, added up by the compiler."""
     flight = exported.untrained(*case)
