@@ -9,16 +9,20 @@ from attjax import AttitudeEnv, evaluation
 from attjax.evaluation.paper import PAPER_TABLE_2
 from attjax.runs import checkpoint
 
-FOLDER = Path(__file__).parent.parent / "pretrained" / "precise"
+PRETRAINED = Path(__file__).parent.parent / "pretrained"
+
+
+def flown(name, frameskip):
+    """Statistics of 500 slews of a pretrained agent."""
+    env = AttitudeEnv(frameskip)
+    policy = checkpoint.restore_policy(PRETRAINED / name)
+    slews = evaluation.fly(policy, env, env.default_params, jax.random.key(11), 500)
+    return evaluation.statistics(slews, env, env.default_params)
 
 
 @pytest.mark.parametrize("frameskip, settling_s", [(5, 8.8), (20, 16.5)])
 def test_pretrained_agent_beats_table_2(frameskip, settling_s):
-    env = AttitudeEnv(frameskip)
-    flown = evaluation.fly(
-        checkpoint.restore_policy(FOLDER), env, env.default_params, jax.random.key(11), 500
-    )
-    result = evaluation.statistics(flown, env, env.default_params)
+    result = flown("precise", frameskip)
     assert result["success_rate"] == 1 and result["overspeed_rate"] == 0
     assert result["settling_time_s"]["mean"] < settling_s
     for (state, quantity), paper in PAPER_TABLE_2.items():
@@ -26,3 +30,15 @@ def test_pretrained_agent_beats_table_2(frameskip, settling_s):
         for statistic, value in zip(evaluation.STATISTICS, paper):
             if statistic != "min":  # a single draw
                 assert ours[statistic] < value, (state, quantity, statistic)
+
+
+@pytest.mark.parametrize(
+    "name, success, score", [("paper", (0.6, 0.8), 2_100), ("paper-gae", (0.99, 1), 3_200)]
+)
+def test_the_papers_reward_brings_its_return_and_not_its_table_2(name, success, score):
+    result = flown(name, 20)
+    assert success[0] <= result["success_rate"] <= success[1]
+    assert result["episode_return"]["mean"] > score
+    papers_mean = PAPER_TABLE_2["terminal", "error_deg"][0]
+    assert result["terminal"]["error_deg"]["min"] > papers_mean
+    assert result["terminal_success"]["error_deg"]["mean"] > 50 * papers_mean

@@ -30,7 +30,7 @@ def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         usage=USAGE, description=__doc__, epilog=command_line.examples(EXAMPLES)
     )
     groups = {name: parser.add_argument_group(title) for name, title in fields.GROUPS.items()}
-    remarks = "; ".join(presets.REMARKS.values())
+    remarks = "; ".join(presets.REMARKS.values()).replace("%", "%%")
     default = run_config.DEFAULT_PRESET
     preset_help = f"the recipe; flags override it; {remarks} (default: {default})"
     groups["run"].add_argument("--preset", choices=presets.PRESETS, help=preset_help)
