@@ -42,8 +42,8 @@ PAPER = Settings(
 )
 """All that the paper names, to the letter. It does not give N (``passes``).
 
-One pass learns nothing in 13 million agent steps; four reach the paper's return of 2,500 after
-15 million (docs/reproduction.md).
+One pass has 1 % success after 13 million agent steps; four reach the paper's return of 2,500 after
+15 million (seed 0, docs/reproduction.md).
 """
 
 PAPER_GAE = PAPER.replace(gae_lambda=0.95)
