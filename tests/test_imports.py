@@ -77,13 +77,14 @@ def test_importing_every_module_changes_nothing_of_the_process():
 
 
 @pytest.mark.parametrize("fails", [False, True])
-def test_orbax_is_kept_quiet_no_longer_than_it_works(fails, monkeypatch):
-    """Where it fails its threads go on: then its tracebacks, and no others, are dropped."""
+def test_orbax_is_kept_quiet_no_longer_than_it_works(fails, monkeypatch, caplog):
+    """Where it fails its threads and tasks go on: what it says of them, no more, is dropped."""
     heard = []
     monkeypatch.setattr(sys, "unraisablehook", heard.append)
     loggers = [logging.getLogger(name) for name in quiet.LOGGERS]
     for logger in loggers:
         monkeypatch.setattr(logger, "level", logging.INFO)
+        monkeypatch.setattr(logger, "filters", [])
     before = sys.unraisablehook
     for _ in range(2):
         with quiet.orbax() as failures:
@@ -97,3 +98,7 @@ def test_orbax_is_kept_quiet_no_longer_than_it_works(fails, monkeypatch):
     sys.unraisablehook(of_orbax)
     sys.unraisablehook(other)
     assert heard == ([other] if fails else [of_orbax, other])
+    task = "Task exception was never retrieved\nfuture: <Task coro=<save() defined at %s:188>>"
+    for file in ("site-packages/orbax/checkpoint/serialization.py", "other/orbax.py"):
+        logging.getLogger("asyncio").error(task, file)
+    assert ["other/orbax.py" in text for text in caplog.messages] == [False, True][fails:]

@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import logging
+import re
 import sys
 import traceback
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ def orbax() -> Iterator[list[str]]:
     """Let Orbax neither log nor print tracebacks within the context; after it all is as before.
 
     But where it fails, as the caller notes in the list, other work that it had begun ends later, in
-    threads of its own: its tracebacks are then dropped to the end of the process.
+    threads and tasks of its own: what it says of them is then dropped to the end of the process.
     """
     failures: list[str] = []
     levels = {logging.getLogger(name): logging.getLogger(name).level for name in LOGGERS}
@@ -31,6 +32,8 @@ def orbax() -> Iterator[list[str]]:
         if not failures:
             sys.unraisablehook = hook
         for logger, level in levels.items():
+            if failures:
+                logger.addFilter(_is_not_of_orbax)
             logger.setLevel(level)
 
 
@@ -40,3 +43,8 @@ def _show(hook, unraisable):
     is_orbax = any("orbax" in Path(file).parts for file in files)
     if not is_orbax and str(unraisable.exc_value) != "Event loop is closed":
         hook(unraisable)
+
+
+def _is_not_of_orbax(record):
+    """Not what Orbax logs, nor what asyncio logs of a task of Orbax that nobody waited for."""
+    return not re.search(r"[\\/]orbax[\\/]", f"{record.pathname}\n{record.getMessage()}")
