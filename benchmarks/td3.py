@@ -12,14 +12,14 @@ Example:
     python eval.py --checkpoint runs/td3
 """
 
-import argparse
+import functools
 import importlib
 import os
 import sys
 from pathlib import Path
 
 from attjax import errors
-from attjax.config import command_line
+from attjax.config import command_line, fields
 
 REWARDS = ("paper", "binary", "authors-continuous", "logarithmic")
 STATE, CURVE = "td3.npz", "curve.csv"
@@ -31,15 +31,12 @@ def parse_arguments(argv=None):
     """The command line."""
     parser = command_line.Parser(description=__doc__)
     parser.add_argument("--reward", choices=REWARDS, default="paper", help="(default: paper)")
-    scale_help = "factor of the reward (default: 1)"
-    parser.add_argument("--reward-scale", type=positive, default=1.0, metavar="X", help=scale_help)
-    parser.add_argument("--seed", type=natural, default=0, metavar="N", help="(default: 0)")
-    steps_help = "agent steps in all (default: 500000)"
-    parser.add_argument("--steps", type=natural, default=500_000, metavar="N", help=steps_help)
-    every_help = "agent steps between two rows, each saved (default: 10000)"
-    parser.add_argument("--every", type=natural, default=10_000, metavar="N", help=every_help)
-    slews_help = "greedy slews of a row (default: 200)"
-    parser.add_argument("--slews", type=natural, default=200, metavar="N", help=slews_help)
+    add = functools.partial(command_line.add_number, parser)
+    add("reward-scale", float, 1.0, "factor of the reward", above=0)
+    add("seed", int, 0, "of networks, exploration and episodes", **fields.SEED)
+    add("steps", int, 500_000, "agent steps in all", low=1)
+    add("every", int, 10_000, "agent steps between two rows, each saved", low=1)
+    add("slews", int, 200, "greedy slews of a row", low=1)
     out_help = "folder of the run"
     parser.add_argument("--out", type=command_line.path, required=True, help=out_help)
     parser.add_argument("--resume", action="store_true", help="go on with the folder's run")
@@ -47,27 +44,7 @@ def parse_arguments(argv=None):
     if (arguments.out / STATE).exists() != arguments.resume:
         there = "holds a run: pass --resume" if not arguments.resume else "holds no run to resume"
         parser.error(f"--out {arguments.out} {there}, or another folder")
-    if 0 in (arguments.steps, arguments.every, arguments.slews):
-        parser.error("--steps, --every and --slews must be at least 1")
     return arguments
-
-
-def positive(text: str) -> float:
-    """An argparse type: a number above 0."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = 0.0
-    if not 0 < number < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} must be a number above 0")
-    return number
-
-
-def natural(text: str) -> int:
-    """An argparse type: an integer from 0 on."""
-    if not text.isdecimal() or len(text) > 9:
-        raise argparse.ArgumentTypeError(f"{text!r} must be an integer from 0 to 999999999")
-    return int(text)
 
 
 @errors.program("td3.py")
