@@ -5,7 +5,7 @@ continuous actions: 11.43 Hz, 500 steps, ended by the time limit as in the paper
 greedy slews as it goes, and keeps the actor as a run's policy, for eval.py, beside the learner's
 state, from which ``--resume`` of this program goes on.
 
-    python -m venv rejax && rejax/bin/pip install rejax && rejax/bin/pip install --no-deps -e .
+    python -m venv rejax && rejax/bin/pip install --editable . rejax
 
 Example:
     rejax/bin/python benchmarks/td3.py --reward paper --seed 0 --steps 500000 --out runs/td3

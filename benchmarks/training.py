@@ -5,7 +5,7 @@ networks, the same steps, passes and minibatches; one update is timed, compilati
 take turns. Each is shown at its best minibatch size. The ceiling does the matrix products of
 the update alone. A peer runs in its own environment; one that is missing is a row that says so.
 
-    python -m venv rejax && rejax/bin/pip install rejax && rejax/bin/pip install --no-deps -e .
+    python -m venv rejax && rejax/bin/pip install --editable . rejax
     python -m venv sb3 && sb3/bin/pip install -e . torch stable-baselines3 gymnasium
 
 Example:
