@@ -16,7 +16,7 @@ eval: setup
 	$(BIN)/python eval.py --checkpoint $(CHECKPOINT) $(ARGS)
 
 test: setup
-	$(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
+	$(BIN)/python -m pytest -n 2 --dist worksteal --durations 20 --durations-min 5 $(ARGS)
 
 # The suite on every supported Python that is here, each with the newest JAX it can have.
 test-all:
