@@ -133,7 +133,7 @@ PRESETS = {
 
 REMARKS = {
     "paper": (
-        "paper is the letter; it had the paper's return of 2,500 after 15 million agent steps and, "
+        "paper is the letter; it had the paper's return of 2,500 after 16 million agent steps and, "
         "greedy, 69 and 88 % success at the end (two seeds); paper-gae, with λ = 0.95, after 5 "
         "million, and 99.98 and 99.66 %"
     )
