@@ -12,7 +12,6 @@ Example:
     python eval.py --checkpoint runs/td3
 """
 
-import functools
 import importlib
 import os
 import sys
@@ -20,6 +19,7 @@ from pathlib import Path
 
 from attjax import errors
 from attjax.config import command_line, fields
+from attjax.config.command_line import add_number
 
 REWARDS = ("paper", "binary", "authors-continuous", "logarithmic")
 STATE, CURVE = "td3.npz", "curve.csv"
@@ -31,12 +31,11 @@ def parse_arguments(argv=None):
     """The command line."""
     parser = command_line.Parser(description=__doc__)
     parser.add_argument("--reward", choices=REWARDS, default="paper", help="(default: paper)")
-    add = functools.partial(command_line.add_number, parser)
-    add("reward-scale", float, 1.0, "factor of the reward", above=0)
-    add("seed", int, 0, "of networks, exploration and episodes", **fields.SEED)
-    add("steps", int, 500_000, "agent steps in all", low=1)
-    add("every", int, 10_000, "agent steps between two rows, each saved", low=1)
-    add("slews", int, 200, "greedy slews of a row", low=1)
+    add_number(parser, "reward-scale", float, 1.0, "factor of the reward", above=0)
+    add_number(parser, "seed", int, 0, "of networks, exploration and episodes", **fields.SEED)
+    add_number(parser, "steps", int, 500_000, "agent steps in all", low=1)
+    add_number(parser, "every", int, 10_000, "agent steps between two rows, each saved", low=1)
+    add_number(parser, "slews", int, 200, "greedy slews of a row", low=1)
     out_help = "folder of the run"
     parser.add_argument("--out", type=command_line.path, required=True, help=out_help)
     parser.add_argument("--resume", action="store_true", help="go on with the folder's run")

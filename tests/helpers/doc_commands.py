@@ -7,6 +7,7 @@ shortened, on CPU, in a folder like a clone. A command within the text is only c
 import contextlib
 import functools
 import io
+import itertools
 import os
 import re
 import shutil
@@ -64,9 +65,10 @@ def known_flags() -> set[str]:
     scripts = [*ROOT.glob("benchmarks/*.py"), *map(ROOT.joinpath, CAMPAIGNS)]
     sources = [path.read_text() for path in scripts]
     help_text = re.sub(r"--\[no-\]([\w-]+)", r"--\1 --no-\1", text.getvalue())
-    return set(re.findall(r"--[a-z][\w-]*", help_text)) | {
-        flag for source in sources for flag in re.findall(r'"(--[a-z][\w-]*)"', source)
-    }
+    added = r'"(--[a-z][\w-]*)"', r'add_number\(\w+, "([a-z][\w-]*)"'
+    found = (re.findall(pattern, source) for pattern in added for source in sources)
+    flags = ("--" + flag.removeprefix("--") for flag in itertools.chain(*found))
+    return {*re.findall(r"--[a-z][\w-]*", help_text), *flags}
 
 
 def python_process(*words: str) -> subprocess.CompletedProcess:
