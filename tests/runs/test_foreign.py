@@ -112,9 +112,11 @@ def test_the_parameters_are_those_of_a_policy_of_its_settings():
     "flags, message",
     [
         (["--reward=best"], "argument --reward: invalid choice: 'best'"),
-        (["--reward-scale=0"], "'0' must be a number above 0"),
-        (["--seed=-1"], "'-1' must be an integer from 0"),
-        (["--steps=0"], "--steps, --every and --slews must be at least 1"),
+        (["--reward-scale=0"], "reward-scale is 0.0; it must be a number above 0"),
+        (["--seed=-1"], "seed is -1; it must be an integer at least 0"),
+        (["--steps=0"], "steps is 0; it must be an integer at least 1"),
+        (["--every=0"], "every is 0; it must be an integer at least 1"),
+        (["--slews=0"], "slews is 0; it must be an integer at least 1"),
         (["--resume"], "holds no run to resume"),
     ],
 )
