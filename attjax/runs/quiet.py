@@ -3,12 +3,14 @@
 import contextlib
 import functools
 import logging
-import re
 import sys
 import traceback
 from collections.abc import Iterator
 from pathlib import Path
 
+import orbax.checkpoint
+
+ORBAX = str(Path(orbax.checkpoint.__file__).parent)
 LOGGERS = ("absl", "asyncio")
 
 
@@ -40,11 +42,11 @@ def orbax() -> Iterator[list[str]]:
 def _show(hook, unraisable):
     """Print no traceback of what Orbax leaves be where another array's file fails."""
     files = [frame.filename for frame in traceback.extract_tb(unraisable.exc_traceback)]
-    is_orbax = any("orbax" in Path(file).parts for file in files)
+    is_orbax = any(ORBAX in file for file in files)
     if not is_orbax and str(unraisable.exc_value) != "Event loop is closed":
         hook(unraisable)
 
 
 def _is_not_of_orbax(record):
     """Not what Orbax logs, nor what asyncio logs of a task of Orbax that nobody waited for."""
-    return not re.search(r"[\\/]orbax[\\/]", f"{record.pathname}\n{record.getMessage()}")
+    return ORBAX not in f"{record.pathname}\n{record.getMessage()}"

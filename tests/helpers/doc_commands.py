@@ -65,7 +65,7 @@ def known_flags() -> set[str]:
     scripts = [*ROOT.glob("benchmarks/*.py"), *map(ROOT.joinpath, CAMPAIGNS)]
     sources = [path.read_text() for path in scripts]
     help_text = re.sub(r"--\[no-\]([\w-]+)", r"--\1 --no-\1", text.getvalue())
-    added = r'"(--[a-z][\w-]*)"', r'add_number\(\w+, "([a-z][\w-]*)"'
+    added = r'"(--[a-z][\w-]*)"', r'add_number\(\s*\w+,\s*"([a-z][\w-]*)"'
     found = (re.findall(pattern, source) for pattern in added for source in sources)
     flags = ("--" + flag.removeprefix("--") for flag in itertools.chain(*found))
     return {*re.findall(r"--[a-z][\w-]*", help_text), *flags}
