@@ -91,6 +91,7 @@ def draw(curves: dict[str, dict[str, np.ndarray]], part: float, path: Path) -> N
     returns.axhline(PAPERS_PLATEAU, label="the paper's plateau", **style)
     returns.set_ylabel("return (Eq. 12–13)")
     successes.set(ylabel="success (%)", xlabel="agent steps (millions)", xscale="log")
+    successes.xaxis.set_major_formatter("{x:g}")
     for axis in (returns, successes):
         axis.grid(alpha=0.3)
     figure.suptitle("The exploring policy during training, at 11.43 Hz")
