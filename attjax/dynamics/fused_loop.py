@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+import chex
 import jax
 import jax.numpy as jnp
 
@@ -40,11 +41,40 @@ def one_loop(function: Callable[..., Tree], *operands: Any) -> Tree:
     scalars = [jnp.asarray(x) for x in leaves]
     scalars += scalars[:1] * (outputs - arguments)
 
+    # Called, for StableHLO's ReduceOpUnusedResultCanon walks through the reducer itself once for
+    # each result that is ignored and again from each use: exponentially long. No call is entered.
+    called = jax.jit(function)
+
     def reducer(_, current):
-        values = function(*jax.tree.unflatten(structure, current[:arguments]))
+        values = called(*jax.tree.unflatten(structure, current[:arguments]))
         return (*jax.tree.leaves(values), *current[outputs:])
 
     copies = [jnp.broadcast_to(x, (2,)) for x in scalars]
     zeros = [jnp.zeros((), x.dtype) for x in scalars]
     reduced = jax.lax.reduce(tuple(copies), tuple(zeros), reducer, (0,))
     return jax.tree.unflatten(jax.tree.structure(shapes), reduced[:outputs])
+
+
+@jax.custom_jvp
+def apart(vector: chex.Array) -> chex.Array:
+    """The same vector, under ``vmap`` on CPU worked out before the loops that use it begin.
+
+    A loop in which it is looked up in a table, say, is one that the compiler does not vectorise.
+
+    Args:
+        vector: (n,) floating-point.
+
+    Example:
+        >>> apart(jnp.arange(3.0)).tolist()
+        [0.0, 1.0, 2.0]
+    """
+
+    def by_a_loop(vector):
+        return jnp.stack(one_loop(lambda *components: components, *vector))
+
+    return jax.lax.platform_dependent(vector, cpu=by_a_loop, default=lambda vector: vector)
+
+
+@apart.defjvp
+def _apart_jvp(primals, tangents):
+    return apart(*primals), tangents[0]

@@ -19,11 +19,14 @@ from attjax import checks
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
 from attjax.dynamics.equations import EquationsOfMotion, RigidState, add
-from attjax.dynamics.fused_loop import one_loop
+from attjax.dynamics.fused_loop import apart, one_loop
 from attjax.spacecraft import INTEGRATION_STEP
 
-STEPS_IN_LINE = 20
-"""Torque-free RK4 steps compiled for CPU one after another before there is a loop over them."""
+STEPS_TOGETHER = 7
+"""RK4 steps that CPUs take in one loop over a batch: three such loops are the paper's 21."""
+
+LOOPS_IN_LINE = 3
+"""Most of those loops that are compiled one after another before there is a loop over them."""
 
 
 class AgentStep(NamedTuple):
@@ -41,7 +44,7 @@ class AgentStep(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """Which of the later RK4 steps this is, and how many of them are taken; as floats."""
+    """Which of the later RK4 steps comes next, and how many of them are taken; as floats."""
 
     number: Float[Array, ""]
     limit: Float[Array, ""]
@@ -138,7 +141,7 @@ def take(
     quaternion, angular_velocity, torque, inertia = _checked(
         quaternion, angular_velocity, torque, inertia
     )
-    equations = EquationsOfMotion.of(inertia, torque, agent_step.kinematic_factor)
+    equations = EquationsOfMotion.of(inertia, apart(torque), agent_step.kinematic_factor)
     start = RigidState.of(quaternion, angular_velocity)
     limit = None if steps_after is None else jnp.asarray(steps_after, quaternion.dtype)
     change = _change(agent_step, start, equations, limit)
@@ -206,37 +209,63 @@ def _change_jvp(agent_step, primals, tangents):
 
 
 def _change_by_scan(agent_step, *parts):
-    return _change_with(lambda function, *trees: function(*trees), 1, agent_step, *parts)
+    return _change_with(lambda function, *trees: function(*trees), (1, 1), agent_step, *parts)
 
 
 def _change_in_line(agent_step, *parts):
-    """The same from the same functions, each RK4 step one loop over the batch."""
-    unroll = max(1, min(agent_step.frameskip, STEPS_IN_LINE))
-    return _change_with(one_loop, unroll, agent_step, *parts)
+    """The same from the same functions, several RK4 steps in each loop over the batch."""
+    return _change_with(one_loop, (STEPS_TOGETHER, LOOPS_IN_LINE), agent_step, *parts)
 
 
-def _change_with(call, unroll, agent_step, start, equations, limit):
+def _change_with(call, groups_of, agent_step, start, equations, limit):
+    """The change in groups of RK4 steps, the first step in the first group.
+
+    Args:
+        call: of a function and its arguments, each group's.
+        groups_of: RK4 steps in a group, and groups in line.
+        agent_step, start, equations, limit: as in :func:`_change`.
+    """
+    together, in_line = groups_of
     later_equations = equations if agent_step.held else equations.coasting()
 
-    def step(change, index):
-        turn = None if limit is None else Turn(number=index, limit=limit)
-        return call(_later_step, turn, start, change, later_equations), None
+    def later(count, number, change):
+        turn = None if limit is None else Turn(number, limit)
+        return call(functools.partial(_more_steps, count), turn, start, change, later_equations)
 
-    change = call(_first_step, start, equations)
-    indices = jnp.arange(agent_step.frameskip, dtype=jnp.result_type(*jax.tree.leaves(start)))
-    return jax.lax.scan(step, change, indices, unroll=unroll)[0]
+    with_first = min(together - 1, agent_step.frameskip)
+    first = functools.partial(_first_steps, agent_step.held, with_first)
+    change = call(first, limit, start, equations)
+    groups, rest = divmod(agent_step.frameskip - with_first, together)
+    numbers = with_first + together * np.arange(groups + 1, dtype=_type(start))
+    change, _ = jax.lax.scan(
+        lambda change, number: (later(together, number, change), None),
+        change,
+        numbers[:groups],
+        unroll=min(max(groups, 1), in_line),
+    )
+    return later(rest, numbers[groups], change) if rest else change
 
 
-def _first_step(start, equations):
-    return _rk4_increment(equations, start, INTEGRATION_STEP)
+def _type(state):
+    return jnp.result_type(*jax.tree.leaves(state))
 
 
-def _later_step(turn, start, change, equations):
-    """Change from the start after one more RK4 step, unless that is beyond the limit."""
-    later = add(change, _rk4_increment(equations, add(start, change), INTEGRATION_STEP))
-    if turn is None:
-        return later
-    return jax.tree.map(lambda a, b: jnp.where(turn.number < turn.limit, b, a), change, later)
+def _first_steps(held, with_first, limit, start, equations):
+    change = _rk4_increment(equations, start, INTEGRATION_STEP)
+    turn = None if limit is None else Turn(number=jnp.zeros_like(limit), limit=limit)
+    later_equations = equations if held else equations.coasting()
+    return _more_steps(with_first, turn, start, change, later_equations)
+
+
+def _more_steps(count, turn, start, change, equations):
+    """Change from the start after more RK4 steps, those beyond the limit left out."""
+    for n in range(count):
+        later = add(change, _rk4_increment(equations, add(start, change), INTEGRATION_STEP))
+        if turn is not None:
+            taken = turn.number + n < turn.limit
+            later = jax.tree.map(functools.partial(jnp.where, taken), later, change)
+        change = later
+    return change
 
 
 def _rk4_increment(equations, state, dt):

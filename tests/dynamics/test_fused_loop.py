@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax.dynamics.fused_loop import one_loop
+from attjax.dynamics.fused_loop import apart, one_loop
 
 
 class Body(NamedTuple):
@@ -41,3 +41,28 @@ def test_whatever_the_trees_there_is_one_reduction():
 def test_more_results_than_operands():
     powers = one_loop(lambda x: {"cube": x**3, "self": x, "square": x**2}, jnp.float32(3))
     assert {name: x.item() for name, x in powers.items()} == {"self": 3, "square": 9, "cube": 27}
+
+
+def test_the_reducer_is_a_call():
+    """Of a function however deep: the compiler's walk through it takes exponentially long."""
+
+    def deep(x, y):
+        for _ in range(200):
+            x, y = x + x * y, x - y
+        return x, y
+
+    lowered = jax.jit(jax.vmap(lambda *xs: one_loop(deep, *xs))).lower(*jnp.ones((2, 8)))
+    _, reducer = lowered.as_text().split("reducer(")
+    body = reducer[reducer.index("{") + 1 : reducer.index("}")].split("\n")
+    operations = [line for line in body if line.strip()]
+    assert len(operations) == 2 and "call @" in operations[0] and "return" in operations[1]
+
+
+def test_what_is_looked_up_comes_apart():
+    """Values and derivatives are of the vector itself; under vmap a reduction makes it."""
+    table = jnp.arange(12.0).reshape(4, 3)
+    rows = jnp.array([2, 0, 3])
+    looked_up = jax.vmap(lambda row: apart(table[row]))
+    np.testing.assert_array_equal(jax.jit(looked_up)(rows), table[rows])
+    np.testing.assert_array_equal(jax.jacfwd(apart)(table[1]), np.eye(3))
+    assert "stablehlo.reduce" in jax.jit(looked_up).lower(rows).as_text()

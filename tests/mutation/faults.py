@@ -49,12 +49,11 @@ FAULTS = {
     ),
     "one coasting step too many": (
         "attjax/dynamics/propagation.py",
-        "jnp.arange(agent_step.frameskip,", "jnp.arange(agent_step.frameskip + 1,",
-        PHYSICS,
+        "for n in range(count):", "for n in range(count + 1):", PHYSICS,
     ),
     "torque twice as strong": (
-        "attjax/dynamics/propagation.py", "change = call(_first_step, start, equations)",
-        "change = call(_first_step, start, equations._replace("
+        "attjax/dynamics/propagation.py", "change = call(first, limit, start, equations)",
+        "change = call(first, limit, start, equations._replace("
         "torque=add(equations.torque, equations.torque)))", PHYSICS,
     ),
     "terminal reward added, not replacing": (
