@@ -1,8 +1,25 @@
 """Functions that differ from NumPy's in their gradients or in how they round."""
 
+import functools
+
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+
+ARCTANGENT = (
+    1.0,
+    -0.3333327629200022,
+    0.19998075281505315,
+    -0.1426001608570026,
+    0.1093234151327955,
+    -0.08349724996759872,
+    0.05708955633078856,
+    -0.030351865114653258,
+    0.010487649399874501,
+    -0.0017011700903822203,
+)
+"""Coefficients of arctan(√t)/√t over t from 0 to 1, interpolated at Chebyshev's nodes: 3e-9."""
 
 
 def square_root(x: Float[Array | np.ndarray, "*shape"]) -> Float[Array, "*shape"]:
@@ -18,6 +35,39 @@ def square_root(x: Float[Array | np.ndarray, "*shape"]) -> Float[Array, "*shape"
     """
     positive = x > 0
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, x, 1)), 0)
+
+
+@jax.custom_jvp
+def polar_angle(
+    y: Float[Array | np.ndarray, "*shape"], x: Float[Array | np.ndarray, "*shape"]
+) -> Float[Array, "*shape"]:
+    """arctan2(y, x) for y ≥ 0, element by element: from 0 to π, in float32 to 2e-7 of itself.
+
+    XLA's CPU compiler calls the C library's ``atan2f`` for each element, which takes longer than
+    all else that a reward is made of; this polynomial it vectorises. Float64 has ``arctan2``.
+
+    Example:
+        >>> polar_angle(jnp.float32(1.0), jnp.float32(-1.0)).item() / np.pi
+        0.75
+    """
+    if jnp.result_type(y, x) != jnp.float32:
+        return jnp.arctan2(y, x)
+    width = jnp.abs(x)
+    longer, shorter = jnp.maximum(y, width), jnp.minimum(y, width)
+    ratio = shorter / jnp.where(longer > 0, longer, 1)
+    square = ratio * ratio
+    polynomial = functools.reduce(lambda sum_, c: sum_ * square + c, ARCTANGENT[::-1])
+    angle = ratio * polynomial
+    angle = jnp.where(y > width, jnp.pi / 2 - angle, angle)
+    return jnp.where(x < 0, jnp.pi - angle, angle)
+
+
+@polar_angle.defjvp
+def _polar_angle_jvp(point, change):
+    (y, x), (dy, dx) = point, change
+    squared = x * x + y * y
+    turned = jnp.where(squared > 0, x * dy - y * dx, 0)
+    return polar_angle(y, x), turned / jnp.where(squared > 0, squared, 1)
 
 
 def add(

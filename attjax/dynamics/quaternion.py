@@ -12,7 +12,7 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Float, Real
 
 from attjax import checks
-from attjax.dynamics.numerics import square_root
+from attjax.dynamics.numerics import polar_angle, square_root
 
 
 def from_axis_angle(
@@ -80,7 +80,7 @@ def rotation_vector(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, 
     """
     quaternion = checks.real("quaternion", quaternion, (4,))
     sine = square_root(jnp.sum(quaternion[:3] ** 2))
-    half_angle = jnp.arctan2(sine, jnp.abs(quaternion[3]))
+    half_angle = polar_angle(sine, jnp.abs(quaternion[3]))
     tiny = jnp.finfo(quaternion.dtype).tiny
     scale = jnp.where(sine > tiny, 2 * half_angle / jnp.maximum(sine, tiny), 2.0)
     return jnp.where(quaternion[3] < 0, -scale, scale) * quaternion[:3]
@@ -98,4 +98,4 @@ def error_angle(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, ""]:
         1.146e-07
     """
     quaternion = checks.real("quaternion", quaternion, (4,))
-    return 2 * jnp.arctan2(square_root(jnp.sum(quaternion[:3] ** 2)), quaternion[3])
+    return 2 * polar_angle(square_root(jnp.sum(quaternion[:3] ** 2)), quaternion[3])
