@@ -1,7 +1,5 @@
 """Functions that differ from NumPy's in their gradients or in how they round."""
 
-import functools
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -56,7 +54,9 @@ def polar_angle(
     longer, shorter = jnp.maximum(y, width), jnp.minimum(y, width)
     ratio = shorter / jnp.where(longer > 0, longer, 1)
     square = ratio * ratio
-    polynomial = functools.reduce(lambda sum_, c: sum_ * square + c, ARCTANGENT[::-1])
+    polynomial = jnp.zeros_like(square)
+    for coefficient in reversed(ARCTANGENT):
+        polynomial = polynomial * square + coefficient
     angle = ratio * polynomial
     angle = jnp.where(y > width, jnp.pi / 2 - angle, angle)
     return jnp.where(x < 0, jnp.pi - angle, angle)

@@ -10,6 +10,7 @@ from flax import struct
 
 from attjax import checks
 from attjax.dynamics import propagation
+from attjax.dynamics.integration import AgentStep
 from attjax.spacecraft import LM50, Spacecraft
 from attjax.values import check_share, check_truth
 
@@ -184,7 +185,7 @@ def step(
     angular_velocity = checks.real("angular_velocity", state.angular_velocity, (3,))
     moving = quaternion, angular_velocity, applied_torque(action, params), params.inertia
     have_values = all(map(checks.has_value, jax.tree.leaves((moving, params.frameskip))))
-    agent_step = propagation.AgentStep(frameskip, params.torque_held, kinematic_factor)
+    agent_step = AgentStep(frameskip, params.torque_held, kinematic_factor)
     take = _compiled_take if have_values else propagation.take
     quaternion, angular_velocity = take(agent_step, *moving, params.frameskip)
     return EnvState(quaternion, angular_velocity, state.time + 1)

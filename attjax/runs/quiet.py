@@ -8,9 +8,9 @@ import traceback
 from collections.abc import Iterator
 from pathlib import Path
 
-import orbax.checkpoint
+import orbax.checkpoint as ocp
 
-ORBAX = str(Path(orbax.checkpoint.__file__).parent)
+ORBAX = str(Path(ocp.__file__).parent)
 LOGGERS = ("absl", "asyncio")
 
 

@@ -12,7 +12,7 @@ from bodies import LM50, random_spacecraft, rotated_inertia
 from scipy.integrate import solve_ivp
 
 from attjax import dynamics
-from attjax.dynamics import equations, propagation, quaternion
+from attjax.dynamics import equations, integration, propagation, quaternion
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 BODIES = pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
@@ -42,7 +42,7 @@ def test_the_order_of_the_fields_changes_nothing(monkeypatch, inertia, held, ste
     expected = fly()
     for name in FORMS:
         backwards = reordered(getattr(equations, name))
-        for module in (equations, propagation):
+        for module in (equations, integration, propagation):
             if hasattr(module, name):
                 monkeypatch.setattr(module, name, backwards)
     ours = fly()
@@ -99,8 +99,8 @@ def test_a_state_that_holds_more_flows_through(x64, held):
     laws = WheelEquations(body, tuple(jnp.asarray(LM50)), jnp.asarray(motor))
     start = WheelState(jnp.asarray(momentum), equations.RigidState.of(q, w))
     batch = jax.tree.map(lambda x: x[None], start)
-    agent_step = propagation.AgentStep(frameskip, held)
-    for change in (propagation._change, propagation._change_by_scan, propagation._change_in_line):
+    agent_step = integration.AgentStep(frameskip, held)
+    for change in (integration.change, integration.change_by_scan, integration.change_in_line):
         fly = jax.jit(jax.vmap(functools.partial(change, agent_step), (0, None, None)))
         after = equations.add(batch, fly(batch, laws, None))
         ours = [*after.rigid.quaternion, *after.rigid.angular_velocity, after.momentum]

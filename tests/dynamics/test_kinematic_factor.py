@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from attjax import dynamics
 from attjax.dynamics import propagation, quaternion
-from attjax.dynamics.propagation import AgentStep
+from attjax.dynamics.integration import AgentStep
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 BODIES = pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])

@@ -13,7 +13,7 @@ from references import NO_TORQUE, START, reference
 from scipy.spatial.transform import Rotation
 
 from attjax import dynamics
-from attjax.dynamics import equations, propagation
+from attjax.dynamics import equations, integration
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -193,12 +193,12 @@ def test_the_loops_for_cpu_do_as_the_plain_scan(x64, inertia, kind):
     motion = equations.EquationsOfMotion.of(jnp.asarray(inertia, float), jnp.ones(3))
     quaternion, rate, _ = random_spacecraft(37)
     start = equations.RigidState.of(quaternion.T, rate.T)
-    agent_step = propagation.AgentStep(*kind)
+    agent_step = integration.AgentStep(*kind)
     plain, in_line = (
         jax.jit(jax.vmap(functools.partial(change, agent_step), (0, None, None)))(
             start, motion, None
         )
-        for change in (propagation._change_by_scan, propagation._change_in_line)
+        for change in (integration.change_by_scan, integration.change_in_line)
     )
     chex.assert_trees_all_close(in_line, plain, rtol=0, atol=1e-15)
 

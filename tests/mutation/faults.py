@@ -40,7 +40,7 @@ FAULTS = {
         PHYSICS,
     ),
     "wrong order in RK4": (
-        "attjax/dynamics/propagation.py", "k3 = equations.rate(advance(dt / 2, k2))",
+        "attjax/dynamics/integration.py", "k3 = equations.rate(advance(dt / 2, k2))",
         "k3 = equations.rate(advance(dt / 2, k1))", PHYSICS,
     ),
     "skipped normalisation": (
@@ -48,11 +48,11 @@ FAULTS = {
         "return quaternions.normalize(quaternion)", "return (quaternion)", PHYSICS,
     ),
     "one coasting step too many": (
-        "attjax/dynamics/propagation.py",
+        "attjax/dynamics/integration.py",
         "for n in range(count):", "for n in range(count + 1):", PHYSICS,
     ),
     "torque twice as strong": (
-        "attjax/dynamics/propagation.py", "change = call(first, limit, start, equations)",
+        "attjax/dynamics/integration.py", "change = call(first, limit, start, equations)",
         "change = call(first, limit, start, equations._replace("
         "torque=add(equations.torque, equations.torque)))", PHYSICS,
     ),
