@@ -128,12 +128,19 @@ def _first_steps(held, with_first, limit, start, equations):
 def _more_steps(count, turn, start, change, equations):
     """Change from the start after more RK4 steps, those beyond the limit left out."""
     for n in range(count):
-        later = add(change, rk4_increment(equations, add(start, change), INTEGRATION_STEP))
-        if turn is not None:
-            taken = turn.number + n < turn.limit
-            later = jax.tree.map(functools.partial(jnp.where, taken), later, change)
-        change = later
+        turn_of_n = None if turn is None else turn._replace(number=turn.number + n)
+        change = _later_step(turn_of_n, start, change, equations)
     return change
+
+
+@jax.jit
+def _later_step(turn, start, change, equations):
+    """One of them; jitted so that it is traced once for all."""
+    later = add(change, rk4_increment(equations, add(start, change), INTEGRATION_STEP))
+    if turn is None:
+        return later
+    is_taken = turn.number < turn.limit
+    return jax.tree.map(functools.partial(jnp.where, is_taken), later, change)
 
 
 def rk4_increment(
