@@ -45,7 +45,7 @@ def polar_angle(
     all else that a reward is made of; this polynomial it vectorises. Float64 has ``arctan2``.
 
     Example:
-        >>> polar_angle(jnp.float32(1.0), jnp.float32(-1.0)).item() / np.pi
+        >>> round(polar_angle(jnp.float32(1.0), jnp.float32(-1.0)).item() / np.pi, 6)
         0.75
     """
     if jnp.result_type(y, x) != jnp.float32:
