@@ -1,9 +1,9 @@
 """TD3 on continuous torques, as the paper's predecessor [13] trained it, by rejax.
 
 Networks and numbers are the predecessor's (see td3_learner.py), the environment the paper's with
-continuous actions: 11.43 Hz, 500 steps, ended by the time limit as in the paper. Prints a row of
-greedy slews as it goes, and keeps the actor as a run's policy, for eval.py, beside the learner's
-state, from which ``--resume`` of this program goes on.
+continuous actions: 11.43 Hz, 500 steps. Prints a row of greedy slews as it goes, and keeps the
+actor as a run's policy, for eval.py, beside the learner's state, from which ``--resume`` of this
+program goes on.
 
     python -m venv rejax && rejax/bin/pip install --editable . rejax
 
@@ -38,6 +38,8 @@ def parse_arguments(argv=None):
     add_number(parser, "slews", int, 200, "greedy slews of a row", low=1)
     out_help = "folder of the run"
     parser.add_argument("--out", type=command_line.path, required=True, help=out_help)
+    limit_help = "learn the time limit as an end; without it, what comes after counts"
+    parser.add_argument("--time-limit-terminates", action="store_true", help=limit_help)
     parser.add_argument("--resume", action="store_true", help="go on with the folder's run")
     arguments = parser.parse_args(argv)
     if (arguments.out / STATE).exists() != arguments.resume:
@@ -67,7 +69,8 @@ def train(learners, arguments) -> int:
     from attjax.runs import folder as run_folder
 
     env = AttitudeEnv(20, functions[arguments.reward], actions="continuous")
-    learner = learners.Learner(env, arguments.reward_scale, arguments.seed)
+    task = learners.Task(env, arguments.reward_scale, arguments.time_limit_terminates)
+    learner = learners.Learner(task, arguments.seed)
     with run_folder.opened(arguments.out):
         begin(arguments, learner, config(learners, arguments))
         print(*COLUMNS, flush=True)
@@ -93,6 +96,7 @@ def config(learners, arguments):
     settings = PAPER.replace(
         reward=arguments.reward,
         reward_scale=arguments.reward_scale,
+        time_limit_terminates=arguments.time_limit_terminates,
         actions="continuous",
         hidden_sizes=learners.HIDDEN_SIZES,
         total_steps=arguments.steps,
@@ -111,7 +115,7 @@ def begin(arguments, learner, config) -> None:
     """Make the folder a run's, or go on from its state.
 
     Raises:
-        UserError: its run has another reward, scale or seed.
+        UserError: its run has another reward, scale, end or seed.
     """
     import dataclasses
 
@@ -123,7 +127,8 @@ def begin(arguments, learner, config) -> None:
     old = run_folder.read_config(arguments.out)
     settings = old.settings.replace(total_steps=arguments.steps)
     if dataclasses.replace(old, settings=settings) != config:
-        raise errors.UserError("--resume keeps the run's --reward, --reward-scale and --seed")
+        kept = "--reward, --reward-scale, --time-limit-terminates and --seed"
+        raise errors.UserError(f"--resume keeps the run's {kept}")
     run_folder.write_config(arguments.out, config)
     learner.state = restored(arguments.out / STATE, learner.state)
 

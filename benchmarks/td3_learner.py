@@ -1,10 +1,11 @@
 """rejax's TD3 with the predecessor's networks and numbers; td3.py runs it where rejax is installed.
 
-Networks, exploration, targets, losses and Adam are rejax's. Three things are not, none of which
-the recipe tells of: a minibatch is drawn with replacement (rejax draws without, at the cost of a
-random number for every row of the buffer), the networks are updated apart from the buffer, which
-XLA would else copy in each step, and the delay counts gradient steps, however many spacecraft
-there are.
+Networks, exploration, targets, losses and Adam are rejax's. Four things are not, none of which
+the recipe tells of: an episode that the time limit cut has a future, as in the library that the
+recipe's numbers are of, unless asked otherwise (in rejax it is learned as an end), a minibatch is
+drawn with replacement (rejax draws without, at the cost of a random number for every row of the
+buffer), the networks are updated apart from the buffer, which XLA would else copy in each step,
+and the delay counts gradient steps, however many spacecraft there are.
 """
 
 import functools
@@ -14,9 +15,11 @@ import jax.numpy as jnp
 import numpy as np
 import rejax
 from flax import linen as nn
+from flax import struct
 from rejax.networks import DeterministicPolicy, QNetwork
 
 from attjax import AttitudeEnv
+from attjax.envs.simulator import EnvState
 from attjax.runs import foreign
 from attjax.wrappers.gymnax import FiveValueEnv
 
@@ -42,12 +45,56 @@ NUMBERS = {
 """The predecessor's, by rejax's names."""
 
 
+@struct.dataclass
+class Led:
+    """Where a step led to.
+
+    Attributes:
+        state: the environment's, of a new episode if the old one is over.
+        observation: (11,) the one before any reset.
+        ended: whether it has no future.
+    """
+
+    state: EnvState
+    observation: jax.Array
+    ended: jax.Array
+
+
+class Task(FiveValueEnv):
+    """The environment, whose state tells an episode that the time limit cut from one that ended.
+
+    Args:
+        env: with continuous actions.
+        reward_scale: factor of the reward.
+        time_limit_terminates: whether the time limit is learned as an end.
+    """
+
+    def __init__(self, env: AttitudeEnv, reward_scale: float, time_limit_terminates: bool):
+        super().__init__(env, reward_scale)
+        self._time_limit_terminates = time_limit_terminates
+
+    def reset(self, key, params=None):
+        """Observation and state of a new episode."""
+        observation, state = super().reset(key, params)
+        return observation, Led(state, observation, jnp.zeros((), bool))
+
+    @functools.partial(jax.jit, static_argnames="self")
+    def step(self, key, state, action, params=None):
+        """As of any five-value environment."""
+        *results, done, info = super().step(key, state.state, action, params)
+        observation, inner, reward = results
+        ended = done if self._time_limit_terminates else info["terminated"]
+        return observation, Led(inner, info["final_observation"], ended), reward, done, info
+
+
 class TD3(rejax.TD3):
     """One gradient step of the critics for each agent step, one of the actor for each second."""
 
     def iterate(self, state, uniform: bool = False):
         """An agent step of each spacecraft, and as many gradient steps unless it is warm-up."""
         state, transitions = self.collect_transitions(state, uniform=uniform)
+        led = state.env_state
+        transitions = transitions._replace(next_obs=led.observation, done=led.ended)
         buffer = state.replay_buffer.extend(transitions)
         if not uniform:
             rng, key = jax.random.split(state.rng)
@@ -83,13 +130,11 @@ class Learner:
     """TD3 and its state.
 
     Args:
-        env: with continuous actions.
-        reward_scale: factor of the reward.
+        task: what it learns.
         seed: of networks, exploration and episodes.
     """
 
-    def __init__(self, env: AttitudeEnv, reward_scale: float, seed: int):
-        task = FiveValueEnv(env, reward_scale)
+    def __init__(self, task: Task, seed: int):
         given = {"env": task, "num_envs": NUM_ENVS, "num_epochs": NUM_ENVS}
         bounds = -np.ones(3, np.float32), np.ones(3, np.float32)
         self._td3 = TD3.create(**given, **NUMBERS).replace(
