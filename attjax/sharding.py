@@ -1,6 +1,8 @@
 """How compiled programs share their work out to devices, or to CPU cores as devices."""
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
 from typing import Any
 
 import jax
@@ -15,9 +17,27 @@ COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512}
 """For outermost jitted functions only: JAX refuses options on a function called in another."""
 
 
+_others: ContextVar[Sequence[jax.Device] | None] = ContextVar("others", default=None)
+
+
+@contextlib.contextmanager
+def compiled_for(others: Sequence[jax.Device]) -> Iterator[None]:
+    """Programs are lowered for these devices meanwhile, which need not be there."""
+    token = _others.set(others)
+    try:
+        yield
+    finally:
+        _others.reset(token)
+
+
+def devices() -> Sequence[jax.Device]:
+    """Those of JAX's default platform, or of :func:`compiled_for`."""
+    return _others.get() or jax.devices()
+
+
 def mesh(num_devices: int) -> Mesh:
-    """The first devices of JAX's default platform, as one axis."""
-    return Mesh(np.array(jax.devices()[:num_devices]), (AXIS,))
+    """The first devices, as one axis."""
+    return Mesh(np.array(devices()[:num_devices]), (AXIS,))
 
 
 def on_devices(num_devices: int, function: Callable, in_specs: Any, out_specs: Any) -> Callable:

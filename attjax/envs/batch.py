@@ -196,7 +196,7 @@ def _check_batch(states, actions, num_devices):
 def _fly_in_blocks(env, params, keys, states, actions):
     """A device's part of the batch; on CPU block after block, each small enough for the cache."""
     steps, batch, *axes = actions.shape
-    on_cpu = jax.devices()[0].platform == "cpu"
+    on_cpu = sharding.devices()[0].platform == "cpu"
     blocks = batch // CPU_BLOCK if on_cpu and batch % CPU_BLOCK == 0 else 1
     keys = jax.random.split(keys[jax.lax.axis_index(AXIS)], blocks)
     states = jax.tree.map(lambda x: x.reshape(blocks, -1, *x.shape[1:]), states)

@@ -71,12 +71,12 @@ def known_flags() -> set[str]:
     return {*re.findall(r"--[a-z][\w-]*", help_text), *flags}
 
 
-def python_process(*words: str) -> subprocess.CompletedProcess:
+def python_process(*words: str, timeout: float = 120) -> subprocess.CompletedProcess:
     """Run a script of the repository, from its root, as a process."""
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     return subprocess.run(
         [sys.executable, *words],
-        capture_output=True, text=True, timeout=120, env=environment, cwd=ROOT,
+        capture_output=True, text=True, timeout=timeout, env=environment, cwd=ROOT,
     )  # fmt: skip
 
 
