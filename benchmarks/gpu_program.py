@@ -80,7 +80,6 @@ def main(argv=None) -> int:
     """Compile, count and print; returns the exit status."""
     arguments = parse_arguments(argv)
     os.environ["JAX_PLATFORMS"] = "cpu"
-    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "1")  # the compiler tells that there is no driver
     with errors.one_line_errors():
         device = without_a_card(CARDS[arguments.target])
     lowered = importlib.import_module("gpu_lowered")
