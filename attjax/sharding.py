@@ -22,7 +22,10 @@ _others: ContextVar[Sequence[jax.Device] | None] = ContextVar("others", default=
 
 @contextlib.contextmanager
 def compiled_for(others: Sequence[jax.Device]) -> Iterator[None]:
-    """Programs are lowered for these devices meanwhile, which need not be there."""
+    """Programs are lowered for these devices meanwhile, which need not be there.
+
+    Only those that were not traced before: JAX keeps what it has traced, devices and all.
+    """
     token = _others.set(others)
     try:
         yield
