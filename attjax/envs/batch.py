@@ -1,7 +1,6 @@
 """Many spacecraft side by side, with new episodes drawn only for those whose episode ended."""
 
 import functools
-from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import chex
@@ -13,13 +12,11 @@ from jax.sharding import PartitionSpec
 
 from attjax import sharding
 from attjax.dynamics import numerics
+from attjax.envs.restart import restart
 from attjax.sharding import AXIS, SHARED, SPLIT
 
 CPU_BLOCK = 4096
 """Spacecraft whose states and intermediate results fit a core's cache."""
-
-PORTIONS = 16
-"""New episodes are drawn for a batch's 16th part at a time: rarely more end in one step."""
 
 Stepped: TypeAlias = tuple[chex.Array, chex.ArrayTree, chex.Array, chex.Array, chex.Array, dict]
 """Observations, states, rewards, terminated, truncated and info of a batch."""
@@ -85,38 +82,6 @@ def step_and_restart(
         (observations, states),
     )
     return observations, states, rewards, terminated, truncated, info
-
-
-def restart(
-    reset: Callable[[chex.PRNGKey, chex.Array], chex.ArrayTree],
-    key: chex.PRNGKey,
-    ended: chex.Array,
-    ongoing: chex.ArrayTree,
-) -> chex.ArrayTree:
-    """Replace what belongs to ended episodes by fresh ones, a portion of the batch at a time.
-
-    Args:
-        reset: function of a key and a row of the batch, to what belongs to that row.
-        key: of the new episodes.
-        ended: (batch,) bool.
-        ongoing: pytree with leaves (batch, ...).
-
-    Returns:
-        The pytree with the ended rows replaced.
-    """
-    batch = len(ended)
-    portion = max(1, batch // PORTIONS)
-
-    def replace(carry):
-        key, ended, ongoing = carry
-        key, fresh_key = jax.random.split(key)
-        is_ended, rows = jax.lax.top_k(ended.astype(jnp.float32), portion)
-        fresh = jax.vmap(reset)(jax.random.split(fresh_key, portion), rows)
-        rows = jnp.where(is_ended > 0, rows, batch)
-        ongoing = jax.tree.map(lambda x, new: x.at[rows].set(new, mode="drop"), ongoing, fresh)
-        return key, ended.at[rows].set(False, mode="drop"), ongoing
-
-    return jax.lax.while_loop(lambda carry: jnp.any(carry[1]), replace, (key, ended, ongoing))[2]
 
 
 @struct.dataclass

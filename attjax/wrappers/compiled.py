@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from attjax import sharding
-from attjax.envs import batch
+from attjax.envs import batch, restart
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.simulator import EnvParams, EnvState
 
@@ -112,7 +112,7 @@ def step_batch_later_reset(
     observations, states, *results, info = jax.vmap(env.step_env, (0, 0, 0, None))(
         step_keys, states, actions, params
     )
-    observations, states = batch.restart(
+    observations, states = restart.restart(
         lambda key, _: env.reset(key, params), reset_key, ended, (observations, states)
     )
     results = [jnp.where(ended, jnp.zeros_like(x), x) for x in (*results, info["truncated"])]

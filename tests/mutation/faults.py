@@ -108,7 +108,7 @@ FAULTS = {
         ["tests/envs/test_attitude.py"],
     ),
     "reset state cached in the fused rollout": (
-        "attjax/envs/batch.py",
+        "attjax/envs/restart.py",
         "fresh = jax.vmap(reset)(jax.random.split(fresh_key, portion), rows)",
         "fresh = jax.vmap(reset)(jax.random.split(jax.random.key(0), portion), rows)", LEARNING,
     ),
