@@ -5,9 +5,12 @@ import importlib.util
 import json
 import math
 
+import jax
 import pytest
 from commands import ROOT
 from doc_commands import python_process
+
+from attjax import sharding
 
 PROGRAM = ROOT / "tests" / "data" / "by_hand.hlo"
 
@@ -65,6 +68,14 @@ def test_each_card_is_described_whole(benchmark):
             ],
             rel_tol=2e-3,
         )
+
+
+def test_programs_are_compiled_for_other_devices_only_meanwhile():
+    there = jax.devices()
+    with pytest.raises(RuntimeError, match="in between"), sharding.compiled_for(there[:1] * 3):
+        assert sharding.devices() == there[:1] * 3
+        raise RuntimeError("in between")
+    assert sharding.devices() == there
 
 
 @pytest.mark.parametrize(
