@@ -2,9 +2,10 @@
 
 XLA compiles for a card from its data sheet. What is printed is read from the compiled programs:
 how many kernels they launch, what those must read, write and compute, and, of the physics, the
-registers and what is spilled from them. The bound is the time in which the card cannot be faster,
-computed and not run: each kernel takes at least its launch, its bytes at the memory's bandwidth
-and its operations at the lanes' peak, whichever is the longest, one kernel after another.
+registers and what is spilled from them. The bound is computed and not run: each kernel takes its
+launch, its bytes at the memory's bandwidth or its operations at the lanes' peak, whichever is the
+longest, one kernel after another. Only cheaper launches, or a cache that holds what is counted as
+memory, could beat it.
 
     pip install 'attjax[gpu-compile]'
 
