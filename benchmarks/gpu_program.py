@@ -92,11 +92,10 @@ def main(argv=None) -> int:
         for unit, units, lower in lowered.programs(arguments.preset, arguments.slews):
             programs.append(compiled(card, unit, units, lower()))
             print(unit, "compiled", file=sys.stderr)
-    rows = [row(x, card, arguments.launch_us) for x in programs]
-    common.print_table(COLUMNS, rows, notes(card, arguments.launch_us, programs))
+    figures = [figures_of(x, card, arguments.launch_us) for x in programs]
+    common.print_table(COLUMNS, list(map(row, figures)), notes(card, arguments.launch_us, figures))
     for program in programs:
         print_longest(program, card, arguments)
-    figures = [figures_of(x, card, arguments.launch_us) for x in programs]
     common.write_json(arguments.json, {"machine": machine, "programs": figures})
     return 0
 
@@ -107,7 +106,7 @@ def without_a_card(card: Card):
     Raises:
         UserError: what compiles for it is not installed.
     """
-    if importlib.util.find_spec("jax_plugins") is None or _ptxas() is None:
+    if not _has_plugin() or _ptxas() is None:
         raise errors.UserError("no compiler for CUDA; pip install 'attjax[gpu-compile]'")
     from jax.experimental import topologies
 
@@ -115,6 +114,12 @@ def without_a_card(card: Card):
         platform="cuda", target_config=card.target, topology="1x1x1"
     )
     return topology.devices[0]
+
+
+def _has_plugin() -> bool:
+    """Whether there is one for CUDA 12, and not only another."""
+    found = importlib.util.find_spec("jax_plugins")
+    return found is not None and importlib.util.find_spec("jax_plugins.xla_cuda12") is not None
 
 
 def _ptxas() -> Path | None:
@@ -174,30 +179,28 @@ def figures_of(program: Program, card: Card, launch_us: float) -> dict:
     }
 
 
-def row(program: Program, card: Card, launch_us: float) -> list[str]:
-    """Its row of the table."""
-    figures = figures_of(program, card, launch_us)
+def row(figures: dict) -> list[str]:
+    """A program's row of the table."""
     return [
-        program.unit,
-        f"{program.compile_s:.1f}",
+        figures["unit"],
+        f"{figures['compile_s']:.1f}",
         str(figures["kernels"]),
         f"{figures['launches']:.4g}",
-        f"{program.memory / 2**20:.1f}",
+        f"{figures['memory_bytes'] / 2**20:.1f}",
         f"{figures['free_us']:.4g}",
         f"{figures['bound_us']:.4g}",
     ]
 
 
-def notes(card: Card, launch_us: float, programs: list[Program]) -> list[str]:
+def notes(card: Card, launch_us: float, figures_of_all: list[dict]) -> list[str]:
     """What stands below the table."""
     lines = [f"Computed, not run: {launch_us:g} us a launch, {card.bandwidth / 1e9:.0f} GB/s, "]
     lines[0] += f"{card.flops / 1e12:.1f} Tflop/s."
-    for program in programs:
-        figures = figures_of(program, card, launch_us)
+    for figures in figures_of_all:
         told = figures["registers_and_spills"]
         if told:
             lines.append(
-                f"{program.unit}: {figures['heaviest']}, the kernel with the most operations, "
+                f"{figures['unit']}: {figures['heaviest']}, the kernel with the most operations, "
                 f"has {told[0]} registers and spills {told[1]} bytes."
             )
     return lines

@@ -81,8 +81,7 @@ class Task(FiveValueEnv):
     @functools.partial(jax.jit, static_argnames="self")
     def step(self, key, state, action, params=None):
         """As of any five-value environment."""
-        *results, done, info = super().step(key, state.state, action, params)
-        observation, inner, reward = results
+        observation, inner, reward, done, info = super().step(key, state.state, action, params)
         ended = done if self._time_limit_terminates else info["terminated"]
         return observation, Led(inner, info["final_observation"], ended), reward, done, info
 

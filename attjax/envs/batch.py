@@ -151,10 +151,10 @@ def _check_batch(states, actions, num_devices):
     sizes = {x.shape[:1] for x in jax.tree.leaves(states)}
     if sizes != {(batch,)}:
         raise ValueError(f"states has leading axes {sorted(sizes)}; they must be ({batch},)")
-    if not 1 <= num_devices <= len(jax.devices()) or batch % num_devices:
+    if not 1 <= num_devices <= len(sharding.devices()) or batch % num_devices:
         raise ValueError(
             f"num_devices is {num_devices}; it must be a divisor of the batch, {batch}, and at "
-            f"most {len(jax.devices())}, the devices of JAX"
+            f"most {len(sharding.devices())}, the devices of JAX"
         )
 
 
