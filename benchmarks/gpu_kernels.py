@@ -2,7 +2,8 @@
 
 A kernel's bytes are what it must read and write if nothing stays in a cache between kernels; what
 it takes from a larger array, or puts there, counts alone. Its operations are one for each element
-of each elementwise operation, whatever it is, and two for each product that is summed.
+of each elementwise operation, whatever it is, and two for each product that is summed. A reduction
+counts one for each element, or its reducer's once for each result, whichever are more.
 """
 
 import math
@@ -123,12 +124,12 @@ def _kernel(computations, name, instruction, times):
     if instruction.opcode == "fusion":
         inside = computations[_called(instruction, "calls")]
         moved = _bytes_of_fusion(inside)
-        operations = sum(_operations(inside, x) for x in inside.values())
+        operations = _operations_in(computations, inside)
     else:
         given = [around[x] for x in instruction.operands]
         result = instruction._replace(shapes=instruction.shapes[:1])  # what follows is workspace
         moved = sum(map(_bytes, (*given, result)))
-        operations = _operations(around, instruction)
+        operations = _operations(computations, around, instruction)
     return Kernel(instruction.name, times, moved, operations)
 
 
@@ -164,15 +165,23 @@ def _bytes(instruction):
     return sum(BYTES.get(t, DEFAULT_BYTES) * math.prod(d) for t, d in instruction.shapes)
 
 
-def _operations(around, instruction):
+def _operations_in(computations, inside):
+    return sum(_operations(computations, inside, x) for x in inside.values())
+
+
+def _operations(computations, around, instruction):
     if instruction.opcode in NO_OPERATION or not instruction.shapes:
         return 0
+    if instruction.opcode == "call":
+        return _operations_in(computations, computations[_called(instruction, "to_apply")])
     elements = math.prod(instruction.shapes[0][1])
     if instruction.opcode == "dot" or "gemm_backend_config" in instruction.attributes:
         return 2 * elements * _summed_over(around[instruction.operands[0]], instruction.attributes)
-    if instruction.opcode in ("reduce", "sort"):
-        return math.prod(around[instruction.operands[0]].shapes[0][1])
-    return elements
+    given = math.prod(around[instruction.operands[0]].shapes[0][1]) if instruction.operands else 0
+    if instruction.opcode == "reduce":
+        reducer = computations[_called(instruction, "to_apply")]
+        return max(given, elements * _operations_in(computations, reducer))
+    return given if instruction.opcode == "sort" else elements
 
 
 def _summed_over(left, attributes):

@@ -30,6 +30,8 @@ def test_kernels_of_a_program_written_by_hand(benchmark):
         "second": 1,  # the longer branch
         "moved": 10,
         "halved": 50,
+        "reduced": 1,
+        "summed": 1,
         "once": 1,
         "less": 1,  # nobody knows how often: one round, and its condition
         "z": 1,
@@ -39,6 +41,7 @@ def test_kernels_of_a_program_written_by_hand(benchmark):
     # A row taken of the 64, the index and a row, and one put there and another given back.
     assert found["moved"].bytes == row + 4 + row + row + row
     assert found["moved"].operations == 128
+    assert found["reduced"].operations == 5 * 128 and found["summed"].operations == 64 * 128
     # The workspace, 4 MiB, is not moved.
     assert found["z"].bytes == 4 * (64 * 128 + 128 * 32 + 64 * 32)
     assert found["z"].operations == 2 * 64 * 128 * 32

@@ -6,6 +6,7 @@ than arrays whose fastest axis has length 3 or 4. The components have their name
 """
 
 import functools
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -15,14 +16,14 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Float, Real
 
 from attjax.dynamics.equations import EquationsOfMotion, RigidState, add
-from attjax.dynamics.fused_loop import one_loop
+from attjax.dynamics.fused_loop import one_kernel, one_loop
 from attjax.spacecraft import INTEGRATION_STEP
 
 STEPS_TOGETHER = 7
-"""RK4 steps that CPUs take in one loop over a batch: three such loops are the paper's 21."""
+"""RK4 steps in one loop over a batch, or in one kernel: three of them are the paper's 21."""
 
-LOOPS_IN_LINE = 3
-"""Most of those loops that are compiled one after another before there is a loop over them."""
+GROUPS_IN_LINE = 3
+"""Most of those groups that are compiled one after another before there is a loop over them."""
 
 
 class AgentStep(NamedTuple):
@@ -65,7 +66,8 @@ def change(
         start,
         equations,
         limit,
-        cpu=functools.partial(change_in_line, agent_step),
+        cpu=functools.partial(change_in_groups, one_loop, agent_step),
+        cuda=functools.partial(change_in_groups, one_kernel, agent_step),
         default=functools.partial(change_by_scan, agent_step),
     )
 
@@ -80,9 +82,14 @@ def change_by_scan(agent_step: AgentStep, *parts: Any) -> RigidState:
     return _change_with(lambda function, *trees: function(*trees), (1, 1), agent_step, *parts)
 
 
-def change_in_line(agent_step: AgentStep, *parts: Any) -> RigidState:
-    """As :func:`change`, from the same functions, several RK4 steps in each loop over the batch."""
-    return _change_with(one_loop, (STEPS_TOGETHER, LOOPS_IN_LINE), agent_step, *parts)
+def change_in_groups(call: Callable, agent_step: AgentStep, *parts: Any) -> RigidState:
+    """As :func:`change`, from the same functions, several RK4 steps at a time.
+
+    Args:
+        call: :func:`one_loop` or :func:`one_kernel`.
+        agent_step, parts: as of :func:`change`.
+    """
+    return _change_with(call, (STEPS_TOGETHER, GROUPS_IN_LINE), agent_step, *parts)
 
 
 def _change_with(call, groups_of, agent_step, start, equations, limit):

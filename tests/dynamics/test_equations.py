@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 
 from attjax import dynamics
 from attjax.dynamics import equations, integration, propagation, quaternion
+from attjax.dynamics.fused_loop import one_kernel, one_loop
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 BODIES = pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
@@ -100,7 +101,8 @@ def test_a_state_that_holds_more_flows_through(x64, held):
     start = WheelState(jnp.asarray(momentum), equations.RigidState.of(q, w))
     batch = jax.tree.map(lambda x: x[None], start)
     agent_step = integration.AgentStep(frameskip, held)
-    for change in (integration.change, integration.change_by_scan, integration.change_in_line):
+    in_groups = [functools.partial(integration.change_in_groups, x) for x in (one_loop, one_kernel)]
+    for change in (integration.change, integration.change_by_scan, *in_groups):
         fly = jax.jit(jax.vmap(functools.partial(change, agent_step), (0, None, None)))
         after = equations.add(batch, fly(batch, laws, None))
         ours = [*after.rigid.quaternion, *after.rigid.angular_velocity, after.momentum]

@@ -1,12 +1,16 @@
-"""The one loop over a batch, apart from the physics that it is for."""
+"""The one loop or kernel over a batch, apart from the physics that it is for."""
 
+import functools
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
-from attjax.dynamics.fused_loop import apart, one_loop
+from attjax.dynamics.fused_loop import FOUND, GIVEN, NOTHING, any_order, apart, one_kernel, one_loop
+
+BOTH = pytest.mark.parametrize("call", [one_loop, one_kernel])
 
 
 class Body(NamedTuple):
@@ -20,11 +24,12 @@ def step(body, wind):
     return {"body": Body(tuple(x + speed for x in body.place), speed, body.push), "sum": speed * 2}
 
 
-def test_trees_go_in_and_come_out():
+@BOTH
+def test_trees_go_in_and_come_out(call):
     """Structure, names and what is absent: as from the function itself."""
     body = Body((jnp.arange(5.0), jnp.ones(5)), jnp.linspace(-1, 1, 5), None)
     wind = {"x": jnp.full(5, 0.25)}
-    ours = jax.jit(jax.vmap(lambda *trees: one_loop(step, *trees)))(body, wind)
+    ours = jax.jit(jax.vmap(lambda *trees: call(step, *trees)))(body, wind)
     expected = jax.vmap(step)(body, wind)
     assert jax.tree.structure(ours) == jax.tree.structure(expected)
     jax.tree.map(np.testing.assert_array_equal, ours, expected)
@@ -38,12 +43,30 @@ def test_whatever_the_trees_there_is_one_reduction():
     assert len(reductions[0].outvars) == 4
 
 
-def test_more_results_than_operands():
-    powers = one_loop(lambda x: {"cube": x**3, "self": x, "square": x**2}, jnp.float32(3))
+@BOTH
+def test_more_results_than_operands(call):
+    powers = call(lambda x: {"cube": x**3, "self": x, "square": x**2}, jnp.float32(3))
     assert {name: x.item() for name, x in powers.items()} == {"self": 3, "square": 9, "cube": 27}
 
 
-def test_the_reducer_is_a_call():
+@pytest.mark.parametrize("order", ["left", "right", "tree", "started everywhere"])
+def test_in_whatever_order_a_device_reduces_the_function_is_applied_once(order):
+    """The function of a result would be another, and so would that of the zeros at the start."""
+    reduce = any_order(lambda values: [3 * values[0] + 1, values[0] - values[1]])
+    given = (jnp.float32(2), jnp.float32(5), jnp.int32(GIVEN))
+    start = (jnp.float32(0), jnp.float32(0), jnp.int32(NOTHING))
+    reduced = {
+        "left": lambda: functools.reduce(reduce, [given] * 3, start),
+        "right": lambda: reduce(given, reduce(given, reduce(given, start))),
+        "tree": lambda: reduce(reduce(given, given), reduce(given, start)),
+        "started everywhere": lambda: reduce(reduce(start, given), reduce(start, start)),
+    }[order]()
+    assert [x.item() for x in reduced] == [7, -3, FOUND]
+    assert reduce(start, start)[2] == NOTHING
+
+
+@BOTH
+def test_the_reducer_is_a_call(call):
     """Of a function however deep: the compiler's walk through it takes exponentially long."""
 
     def deep(x, y):
@@ -51,11 +74,12 @@ def test_the_reducer_is_a_call():
             x, y = x + x * y, x - y
         return x, y
 
-    lowered = jax.jit(jax.vmap(lambda *xs: one_loop(deep, *xs))).lower(*jnp.ones((2, 8)))
+    lowered = jax.jit(jax.vmap(lambda *xs: call(deep, *xs))).lower(*jnp.ones((2, 8)))
     _, reducer = lowered.as_text().split("reducer(")
-    body = reducer[reducer.index("{") + 1 : reducer.index("}")].split("\n")
-    operations = [line for line in body if line.strip()]
-    assert len(operations) == 2 and "call @" in operations[0] and "return" in operations[1]
+    body = reducer[reducer.index("{") + 1 : reducer.index("}")]
+    assert body.count("call @deep") == 1
+    assert body.count("stablehlo.multiply") == 0
+    assert body.count("\n") < 40
 
 
 def test_what_is_looked_up_comes_apart():

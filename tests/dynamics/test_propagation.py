@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from attjax import dynamics
 from attjax.dynamics import equations, integration
+from attjax.dynamics.fused_loop import one_kernel, one_loop
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -188,19 +189,21 @@ def test_wrong_shapes_and_mixed_types_are_refused(as_users_run):
 
 @pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
 @pytest.mark.parametrize("kind", [(0, False), (5, False), (5, True), (45, False)])
-def test_the_loops_for_cpu_do_as_the_plain_scan(x64, inertia, kind):
+@pytest.mark.parametrize("call", [one_loop, one_kernel])
+def test_the_groups_for_each_device_do_as_the_plain_scan(x64, call, inertia, kind):
     """Up to rounding: the compiler contracts products and sums differently."""
     motion = equations.EquationsOfMotion.of(jnp.asarray(inertia, float), jnp.ones(3))
     quaternion, rate, _ = random_spacecraft(37)
     start = equations.RigidState.of(quaternion.T, rate.T)
     agent_step = integration.AgentStep(*kind)
-    plain, in_line = (
+    in_groups = functools.partial(integration.change_in_groups, call)
+    plain, grouped = (
         jax.jit(jax.vmap(functools.partial(change, agent_step), (0, None, None)))(
             start, motion, None
         )
-        for change in (integration.change_by_scan, integration.change_in_line)
+        for change in (integration.change_by_scan, in_groups)
     )
-    chex.assert_trees_all_close(in_line, plain, rtol=0, atol=1e-15)
+    chex.assert_trees_all_close(grouped, plain, rtol=0, atol=1e-15)
 
 
 def test_spacecraft_of_several_control_rates_share_a_program(x64):
