@@ -1,5 +1,7 @@
 """Functions that differ from NumPy's in their gradients or in how they round."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -33,6 +35,19 @@ def square_root(x: Float[Array | np.ndarray, "*shape"]) -> Float[Array, "*shape"
     """
     positive = x > 0
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, x, 1)), 0)
+
+
+def squared_norm(vector: Float[Array | np.ndarray, "components"]) -> Float[Array, ""]:
+    """The sum of the squares of a short vector's components.
+
+    Written out: under ``vmap`` a sum along an axis of three is a loop, or a kernel, of its own.
+
+    Example:
+        >>> squared_norm(jnp.array([1.0, 2.0, 2.0])).item()
+        9.0
+    """
+    first, *others = vector
+    return functools.reduce(lambda total, x: total + x * x, others, first * first)
 
 
 @jax.custom_jvp

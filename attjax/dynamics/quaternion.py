@@ -12,7 +12,7 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Float, Real
 
 from attjax import checks
-from attjax.dynamics.numerics import polar_angle, square_root
+from attjax.dynamics.numerics import polar_angle, square_root, squared_norm
 
 
 def from_axis_angle(
@@ -37,7 +37,7 @@ def from_axis_angle(
 
 def normalize(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, "4"]:
     """Scale a (4,) quaternion to unit length."""
-    return jnp.divide(quaternion, jnp.sqrt(jnp.sum(quaternion**2)))
+    return jnp.divide(quaternion, jnp.sqrt(squared_norm(quaternion)))
 
 
 def derivative(
@@ -79,7 +79,7 @@ def rotation_vector(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, 
         -0.5
     """
     quaternion = checks.real("quaternion", quaternion, (4,))
-    sine = square_root(jnp.sum(quaternion[:3] ** 2))
+    sine = square_root(squared_norm(quaternion[:3]))
     half_angle = polar_angle(sine, jnp.abs(quaternion[3]))
     tiny = jnp.finfo(quaternion.dtype).tiny
     scale = jnp.where(sine > tiny, 2 * half_angle / jnp.maximum(sine, tiny), 2.0)
@@ -98,4 +98,4 @@ def error_angle(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, ""]:
         1.146e-07
     """
     quaternion = checks.real("quaternion", quaternion, (4,))
-    return 2 * polar_angle(square_root(jnp.sum(quaternion[:3] ** 2)), quaternion[3])
+    return 2 * polar_angle(square_root(squared_norm(quaternion[:3])), quaternion[3])

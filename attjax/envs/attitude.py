@@ -10,6 +10,8 @@ import numpy as np
 
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
+from attjax.dynamics.fused_loop import apart
+from attjax.dynamics.numerics import squared_norm
 from attjax.envs import initial_state, simulator, spaces
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
@@ -119,7 +121,9 @@ class AttitudeEnv:
         """
         params = self.default_params if params is None else params
         simulator.check_params(params, self.frameskip)
-        state = self.initial_state(key, params)
+        start = self.initial_state(key, params)
+        drawn_once = {x: apart(getattr(start, x)) for x in ("quaternion", "angular_velocity")}
+        state = start.replace(**drawn_once)
         return self.observe(observation_key(key), state, params), state
 
     reset_env = reset
@@ -174,7 +178,7 @@ class AttitudeEnv:
         rules = self.frameskip, self.kinematic_factor, self.actions
         next_state = simulator.step(state, action, params, *rules)
         torque = simulator.applied_torque(action, params)
-        rate = jnp.sqrt(jnp.sum(next_state.angular_velocity**2))
+        rate = jnp.sqrt(squared_norm(next_state.angular_velocity))
         terminated = rate > params.rate_limit
         truncated = ~terminated & (next_state.time >= params.max_steps_in_episode)
         transition = Transition(

@@ -177,12 +177,13 @@ def _fly(env, params, key, states, actions):
 
     def body(carry, inputs):
         states, _, totals, excess = carry
-        observations, states, reward, terminated, truncated, _ = step(
-            env, params, inputs[0], states, inputs[1]
+        keys, actions = inputs
+        observations, states, reward, terminated, truncated, _ = step_and_restart(
+            env, params, keys, states, actions
         )
         episodes = totals.episodes + (terminated | truncated)
         reward, excess = numerics.add((totals.reward, excess), reward)
         return (states, observations, Totals(reward, episodes), excess), None
 
-    inputs = (jax.random.split(key, len(actions)), actions)
+    inputs = (jax.random.split(key, (len(actions), 2)), actions)
     return jax.lax.scan(body, (states, observations, totals, jnp.zeros(batch)), inputs)[0][:3]

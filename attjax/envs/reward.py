@@ -13,7 +13,7 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Bool, Float
 
 from attjax.dynamics import quaternion as quaternions
-from attjax.dynamics.numerics import square_root
+from attjax.dynamics.numerics import square_root, squared_norm
 from attjax.spacecraft import INTEGRATION_STEP
 
 TERMINAL_BONUS = 50.0
@@ -61,7 +61,7 @@ def scalar_part_increased(
     Within 0.04° of the goal float32 q_s no longer changes, so where both q_s > 0.5 (or
     both < −0.5) the sharper sin²(φ/2) = ‖q_v‖²/‖q‖² is compared instead.
     """
-    sine_before, sine_after = (jnp.sum(q[:3] ** 2) / jnp.sum(q**2) for q in (before, after))
+    sine_before, sine_after = (squared_norm(q[:3]) / squared_norm(q) for q in (before, after))
     near_goal = (before[3] > 0.5) & (after[3] > 0.5)
     near_antipode = (before[3] < -0.5) & (after[3] < -0.5)
     return jnp.where(
@@ -158,7 +158,7 @@ def authors_continuous_reward(transition: Transition) -> Float[Array, ""]:
         >>> authors_continuous_reward(pushed).item()
         8.5
     """
-    price = TORQUE_PRICE / LARGEST_PULSE * square_root(jnp.sum(transition.impulse**2))
+    price = TORQUE_PRICE / LARGEST_PULSE * square_root(squared_norm(transition.impulse))
     ended = jnp.logical_or(transition.terminated, transition.truncated)
     return authors_reward(transition) - jnp.where(ended, 0.0, price)
 

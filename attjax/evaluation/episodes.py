@@ -109,8 +109,8 @@ def _updated(so_far, excess, number, results, context, params):
     """The outcome after a step, counted from 1, were none ended; and what the impulse lacks."""
     _, state, _, terminated, info = results
     angle = jax.vmap(quaternions.error_angle)(state.quaternion)
-    rate = jnp.sqrt(jnp.sum(state.angular_velocity**2, axis=-1))
-    torque = jnp.sqrt(jnp.sum(info["torque"] ** 2, axis=-1))
+    rate = jnp.sqrt(jax.vmap(numerics.squared_norm)(state.angular_velocity))
+    torque = jnp.sqrt(jax.vmap(numerics.squared_norm)(info["torque"]))
     closer = angle < so_far.closest_angle
     impulse, excess = numerics.add((so_far.impulse, excess), torque * context.torque_duration)
     updated = Episodes(
