@@ -84,12 +84,9 @@ def gradient_steps(setup: train_state.Setup, params, learner) -> jax.stages.Lowe
 
 def evaluation(env: AttitudeEnv, policy, params, slews: int) -> jax.stages.Lowered:
     """Random slews under the greedy policy, to their end."""
-
-    def fly(params, key):
-        controller = jax.tree_util.Partial(policy.act, params)
-        return episodes.fly(controller, env, env.default_params, key, slews)
-
-    return _on_device(fly, params, jax.random.key(0))
+    controller = jax.tree_util.Partial(policy.act, params)
+    keys = jax.random.split(jax.random.key(0), (1, slews))
+    return episodes.fly_blocks.lower(controller, env, env.default_params, keys)
 
 
 def _on_device(function, *arguments):

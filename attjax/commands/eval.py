@@ -132,7 +132,10 @@ def _evaluate(arguments, controllers, env, plots, metrics, json_file):
     params, seed, episodes = env.default_params, arguments.seed or 0, arguments.episodes
     start, results, written = time.monotonic(), [], []
     for name, controller in controllers.items():
-        judged = evaluation.evaluate(controller, env, episodes=episodes, seed=seed)
+        with evaluation_output.flying(name, episodes) as told:
+            judged = evaluation.evaluate(
+                controller, env, episodes=episodes, seed=seed, progress=told
+            )
         results.append({"controller": name} | judged)
         if plots:
             folder = arguments.plot / name if arguments.compare else arguments.plot

@@ -1,7 +1,9 @@
-"""The files that an evaluation writes: tried before the work, written after it."""
+"""What an evaluation shows, and the files that it writes: tried before the work, written after."""
 
+import contextlib
 import json
 import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TextIO
@@ -49,6 +51,26 @@ def prepare_playback(path: Path | None, steps: int) -> None:
     if os.path.exists(path) and not os.path.isfile(path):
         raise errors.UserError(f"--playback {path} cannot be written: it is no ordinary file")
     destinations.check("--playback", path)
+
+
+@contextlib.contextmanager
+def flying(name: str, slews: int) -> Iterator[Callable[[int], None]]:
+    """Show on a terminal how many slews have flown, and when the others will have.
+
+    Yields:
+        What is to be told how many have.
+    """
+    from rich import console as consoles  # late, as --help does not need it
+    from rich import progress
+
+    console = consoles.Console(stderr=True)
+    is_live = console.is_interactive and console.file.isatty()
+    columns = (*progress.Progress.get_default_columns(), progress.MofNCompleteColumn())
+    with progress.Progress(*columns, console=console, transient=True, disable=not is_live) as bar:
+        if is_live:
+            console.show_cursor(True)  # a process that is killed could not bring it back
+        task = bar.add_task(name, total=slews)
+        yield lambda flown: bar.update(task, completed=flown)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -6,18 +6,28 @@ from collections.abc import Callable
 import chex
 import jax
 import jax.numpy as jnp
+import numpy as np
 from flax import struct
 
+from attjax import sharding
 from attjax.dynamics import numerics
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
 from attjax.envs.keys import observation_key, steps_key
 from attjax.envs.simulator import EnvParams, EnvState
+from attjax.sharding import SHARED, SPLIT
 from attjax.values import integer
 
 Controller = Callable[[chex.Array, Context], chex.Array]
 """``act(observation (11,), context) -> action``; a pytree, e.g. ``jax.tree_util.Partial``."""
+
+
+SLEWS_TOGETHER = 1024
+"""Most slews of a block on CPU, whose states and hidden layers of 64 fit the cache of a core."""
+
+SLEWS_A_CALL = 2**15
+"""About the most slews between two calls of a progress."""
 
 
 @struct.dataclass
@@ -65,19 +75,78 @@ def random_slews(
     return jax.vmap(env.reset, (0, None))(jax.random.split(key, episodes), params)
 
 
-@functools.partial(jax.jit, static_argnames=("env", "episodes"))
 def fly(
-    controller: Controller, env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, episodes: int
+    controller: Controller,
+    env: AttitudeEnv,
+    params: EnvParams,
+    key: chex.PRNGKey,
+    episodes: int,
+    progress: Callable[[int], None] | None = None,
 ) -> Episodes:
     """Fly ``episodes`` random slews of ``params.max_steps_in_episode`` steps each.
+
+    The devices share them, and what is kept of each is 37 bytes, however many there are.
+
+    Args:
+        controller: flies them; on CPU a block of them at a time, so that what a network makes of
+            it stays in a core's cache.
+        env, params: what flies.
+        key: of the slews of :func:`random_slews`.
+        episodes: how many.
+        progress: called now and then with how many have flown.
 
     Raises:
         ValueError: there are none.
     """
     if (integer(episodes) or 0) < 1:
         raise ValueError(f"episodes is {episodes!r}; it must be an integer at least 1")
-    observation, state = random_slews(env, params, key, episodes)
-    keys, context = _steps_keys(key, episodes), env.context(params)
+    keys = jax.random.split(key, episodes)
+    num_devices, blocks, size = _shape_of_call(-(-episodes // -(-episodes // SLEWS_A_CALL)))
+    flown = []
+    for start in range(0, episodes, num_devices * blocks * size):
+        rows = np.arange(start, start + num_devices * blocks * size) % episodes  # to fill the last
+        part = keys[rows].reshape(num_devices * blocks, size)
+        flown.append(jax.device_get(fly_blocks(controller, env, params, part, num_devices)))
+        if progress is not None:
+            progress(min(int(rows.size) + start, episodes))
+    return jax.tree.map(lambda *x: np.concatenate(x).reshape(-1)[:episodes], *flown)
+
+
+def _shape_of_call(slews):
+    """Devices, blocks of each and slews of a block, of a call that flies at least so many."""
+    devices = sharding.devices()
+    if devices[0].platform != "cpu":
+        return 1, 1, slews
+    num_devices = min(len(devices), -(-slews // SLEWS_TOGETHER))
+    blocks = -(-slews // (num_devices * SLEWS_TOGETHER))
+    return num_devices, blocks, -(-slews // (num_devices * blocks))
+
+
+@functools.partial(
+    jax.jit, static_argnames=("env", "num_devices"), compiler_options=sharding.COMPILER_OPTIONS
+)
+def fly_blocks(
+    controller: Controller,
+    env: AttitudeEnv,
+    params: EnvParams,
+    keys: chex.PRNGKey,
+    num_devices: int = 1,
+) -> Episodes:
+    """Fly the slews of (blocks, slews) keys; the devices share the blocks. For :func:`fly`."""
+    on_device = sharding.on_devices(
+        num_devices,
+        lambda controller, params, keys: jax.lax.map(
+            lambda block: _fly_block(controller, env, params, block), keys
+        ),
+        (SHARED, SHARED, SPLIT),
+        SPLIT,
+    )
+    return on_device(controller, params, keys)
+
+
+def _fly_block(controller, env, params, reset_keys):
+    observation, state = jax.vmap(env.reset, (0, None))(reset_keys, params)
+    keys, context = jax.vmap(steps_key)(reset_keys), env.context(params)
 
     def step(index, carry):
         observation, state, so_far, excess = carry
@@ -87,15 +156,10 @@ def fly(
         so_far = jax.tree.map(lambda old, new: jnp.where(ended, old, new), so_far, updated)
         return *results[:2], so_far, excess
 
-    zero = jnp.zeros(episodes, observation.dtype)
+    zero = jnp.zeros(len(reset_keys), observation.dtype)
     start = Episodes(zero + jnp.inf, zero, zero, zero, zero > 0, zero.astype(jnp.int32), zero, zero)
     steps = params.max_steps_in_episode
     return jax.lax.fori_loop(0, steps, step, (observation, state, start, zero))[2]
-
-
-def _steps_keys(key, episodes):
-    """The key of each episode's steps, of :func:`random_slews` from the same key."""
-    return jax.vmap(steps_key)(jax.random.split(key, episodes))
 
 
 def _step(controller, env, params, keys, index, observation, state):
@@ -142,7 +206,7 @@ def record(
     slews = len(start.time)
     first = jax.vmap(lambda key, state: env.observe(observation_key(key), state, params))
     observation = first(jax.random.split(key, slews), start)
-    keys = _steps_keys(key, slews)
+    keys = jax.vmap(steps_key)(jax.random.split(key, slews))
 
     def step(carry, index):
         observation, state, _, _, info = _step(controller, env, params, keys, index, *carry)

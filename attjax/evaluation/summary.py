@@ -1,5 +1,7 @@
 """A controller judged: statistics of what came of its slews (Table 2)."""
 
+from collections.abc import Callable
+
 import jax
 import numpy as np
 
@@ -17,6 +19,7 @@ def evaluate(
     *,
     episodes: int = 5000,
     seed: int = 0,
+    progress: Callable[[int], None] | None = None,
 ) -> dict:
     """Judge a controller over random slews, as ``eval.py`` does.
 
@@ -26,6 +29,7 @@ def evaluate(
         env: what flies, and its control rate; by default LM50 at 40 Hz, as in Table 2.
         episodes: number of slews.
         seed: of their starts.
+        progress: called now and then with how many have flown.
 
     Returns:
         The conditions and the statistics, as ``eval.py --json`` writes them.
@@ -40,7 +44,7 @@ def evaluate(
     """
     env = AttitudeEnv(frameskip=5) if env is None else env
     params, key = env.default_params, jax.random.key(seed)
-    flown = fly(jax.tree_util.Partial(controller), env, params, key, episodes)
+    flown = fly(jax.tree_util.Partial(controller), env, params, key, episodes, progress)
     return conditions(env, params, seed, episodes) | statistics(flown, env, params)
 
 
