@@ -23,7 +23,7 @@ Controller = Callable[[chex.Array, Context], chex.Array]
 """``act(observation (11,), context) -> action``; a pytree, e.g. ``jax.tree_util.Partial``."""
 
 
-SLEWS_TOGETHER = 1024
+SLEWS_TOGETHER = 512
 """Most slews of a block on CPU, whose states and hidden layers of 64 fit the cache of a core."""
 
 SLEWS_A_CALL = 2**15

@@ -54,9 +54,14 @@ class Categorical:
         drawn = _first_row((cumulative > threshold) & (probabilities > 0))
         return jnp.where(greedy, self.mode(), drawn)
 
+    @staticmethod
+    def mode_of(outputs: chex.Array) -> chex.Array:
+        """The most probable actions, of a network's (actions, samples) outputs."""
+        return _first_row(outputs == jnp.max(outputs, axis=0))
+
     def mode(self) -> chex.Array:
         """The most probable actions."""
-        return _first_row(self.log_probabilities == jnp.max(self.log_probabilities, axis=0))
+        return self.mode_of(self.log_probabilities)
 
     def log_probability(self, action: chex.Array) -> chex.Array:
         """(samples,) of each sample's action."""
@@ -101,6 +106,11 @@ class Gaussian:
         """Random actions; the mode where greedy."""
         noise = jnp.where(np.asarray(greedy)[..., None], 0.0, noise)
         return (self.mean + jnp.exp(self.log_std) * noise.T).T
+
+    @classmethod
+    def mode_of(cls, outputs: chex.Array) -> chex.Array:
+        """The means, of a network's (2 axes, samples) outputs."""
+        return cls.of(outputs).mode()
 
     def mode(self) -> chex.Array:
         """The means."""

@@ -131,6 +131,45 @@ def test_act_is_the_most_probable_action_at_any_rate():
         assert policy.act(params, observe([0.1, 0.2, 0.0]), context) == expected
 
 
+@pytest.mark.parametrize("actions", ["discrete", "continuous"])
+def test_a_batch_decides_as_each_by_itself(actions):
+    """Whatever is batched: observations, contexts, parameters, keys."""
+    policy = Policy(features="multiscale", hidden_sizes=(16,), actions=actions)
+    kinds = [parameters(policy), jax.tree.map(lambda x: x[..., ::-1], parameters(policy))]
+    states = jax.random.normal(jax.random.key(1), (5, 11))
+    keys = jax.random.split(jax.random.key(2), 5)
+    contexts = [CONTEXT, CONTEXT.replace(control_period=CONTEXT.control_period / 2)]
+    both = jax.tree.map(lambda *x: jnp.stack(x), *contexts)
+    together = jax.vmap(policy.act, (None, 0, None))(kinds[0], states, CONTEXT)
+    drawn = jax.vmap(policy.draw, (None, 0, 0, None))(kinds[0], keys, states, CONTEXT)
+    for i in range(5):
+        np.testing.assert_allclose(together[i], policy.act(kinds[0], states[i], CONTEXT), rtol=1e-5)
+        one = policy.draw(kinds[0], keys[i], states[i], CONTEXT)
+        np.testing.assert_allclose(drawn[i], one, rtol=1e-5)
+    at_two_rates = jax.vmap(policy.act, (None, None, 0))(kinds[0], states[0], both)
+    of_two = jax.vmap(policy.act, (0, None, None))(
+        jax.tree.map(lambda *x: jnp.stack(x), *kinds), states[0], CONTEXT
+    )
+    for i in range(2):
+        one = policy.act(kinds[0], states[0], contexts[i])
+        np.testing.assert_allclose(at_two_rates[i], one, rtol=1e-5)
+        one = policy.act(kinds[i], states[0], CONTEXT)
+        np.testing.assert_allclose(of_two[i], one, rtol=1e-5)
+
+
+def test_a_continuous_action_has_gradients():
+    """In reverse too, which the batched form by itself has none of."""
+    policy = Policy(features="state", hidden_sizes=(16,), actions="continuous")
+    params, states = parameters(policy), jax.random.normal(jax.random.key(1), (3, 11))
+
+    def torque(states):
+        return jax.vmap(policy.act, (None, 0, None))(params, states, CONTEXT)[:, 0].sum()
+
+    found, nudge = jax.grad(torque)(states), jnp.zeros((3, 11)).at[1, 4].set(1e-2)
+    slope = (torque(states + nudge) - torque(states - nudge)) / 2e-2
+    assert found[1, 4] == pytest.approx(float(slope), rel=2e-2)
+
+
 def test_networks_follow_the_default_float_type(x64):
     policy = Policy(features="multiscale", hidden_sizes=(8,))
     context = ENV.context(ENV.default_params)
