@@ -65,8 +65,7 @@ def flying(name: str, slews: int) -> Iterator[Callable[[int], None]]:
 
     console = consoles.Console(stderr=True)
     is_live = console.is_interactive and console.file.isatty()
-    columns = (*progress.Progress.get_default_columns(), progress.MofNCompleteColumn())
-    with progress.Progress(*columns, console=console, transient=True, disable=not is_live) as bar:
+    with progress.Progress(console=console, transient=True, disable=not is_live) as bar:
         if is_live:
             console.show_cursor(True)  # a process that is killed could not bring it back
         task = bar.add_task(name, total=slews)

@@ -26,7 +26,7 @@ Controller = Callable[[chex.Array, Context], chex.Array]
 SLEWS_TOGETHER = 512
 """Most slews of a block on CPU, whose states and hidden layers of 64 fit the cache of a core."""
 
-SLEWS_A_CALL = 2**15
+SLEWS_A_CALL = 2**14
 """About the most slews between two calls of a progress."""
 
 
