@@ -1,4 +1,3 @@
-import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -8,7 +7,6 @@ import attjax
 from attjax import AttitudeEnv, EnvState, Spacecraft, evaluation
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.observation import ANGULAR_VELOCITY
-from attjax.evaluation import episodes as flights
 from attjax.evaluation import paper
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
@@ -211,20 +209,6 @@ def test_one_episode_is_flown_and_none_is_refused():
     assert one.score.shape == (1,)
     with pytest.raises(ValueError, match="episodes is 0; it must be an integer at least 1"):
         evaluation.fly(jax.tree_util.Partial(coast), ENV, with_steps(ENV, 1), jax.random.key(0), 0)
-
-
-def test_slews_are_the_same_in_whatever_blocks_they_fly(monkeypatch):
-    """On however many devices; the last block is filled up, and the filling left out."""
-    controller, params = jax.tree_util.Partial(brake_then_point), with_steps(ENV, 40)
-    arguments = controller, ENV, params, jax.random.key(3), 23
-    at_once = evaluation.fly(*arguments)
-    monkeypatch.setattr(flights, "SLEWS_TOGETHER", 3)
-    monkeypatch.setattr(flights, "SLEWS_A_CALL", 12)
-    so_many = []
-    in_blocks = evaluation.fly(*arguments, progress=so_many.append)
-    assert so_many[-1] == 23 and so_many == sorted(set(so_many)) and len(so_many) > 1
-    assert all(x.shape == (23,) for x in jax.tree.leaves(in_blocks))
-    chex.assert_trees_all_close(in_blocks, at_once, rtol=1e-5, atol=1e-6)
 
 
 def test_statistics_agree_with_a_plain_loop():
