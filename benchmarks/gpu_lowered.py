@@ -86,7 +86,12 @@ def evaluation(env: AttitudeEnv, policy, params, slews: int) -> jax.stages.Lower
     """Random slews under the greedy policy, to their end."""
     controller = jax.tree_util.Partial(policy.act, params)
     keys = jax.random.split(jax.random.key(0), (1, slews))
-    return episodes.fly_blocks.lower(controller, env, env.default_params, keys)
+
+    def fly(controller, keys):
+        # Not by its own jit: of parameters that are constants, the number of steps is known.
+        return episodes.fly_blocks.__wrapped__(controller, env, env.default_params, keys)
+
+    return jax.jit(fly).lower(controller, keys)
 
 
 def _on_device(function, *arguments):
