@@ -13,6 +13,7 @@ import jax.numpy as jnp
 from attjax import checks
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
+from attjax.dynamics.numerics import squared_norm
 from attjax.envs import observation as observations
 from attjax.envs import simulator
 from attjax.envs.context import Context
@@ -98,7 +99,7 @@ def nearest_action(
     The wanted rate is first scaled back to within the rate limit's margin. Of continuous actions it
     is that impulse, about each axis as far as the torque can give it.
     """
-    rate = jnp.sqrt(jnp.sum(wanted_rate**2))
+    rate = jnp.sqrt(squared_norm(wanted_rate))
     scale = jnp.minimum(1.0, RATE_MARGIN * context.rate_limit / jnp.maximum(rate, 1e-12))
     change = wanted_rate * scale - observation[observations.ANGULAR_VELOCITY]
     impulse = rigid_body.angular_momentum(context.inertia, change)

@@ -1,6 +1,7 @@
 """A controller over many slews: what comes of each, or every step of them."""
 
 import functools
+import math
 from collections.abc import Callable
 
 import chex
@@ -101,14 +102,15 @@ def fly(
     if (integer(episodes) or 0) < 1:
         raise ValueError(f"episodes is {episodes!r}; it must be an integer at least 1")
     keys = jax.random.split(key, episodes)
-    num_devices, blocks, size = _shape_of_call(-(-episodes // -(-episodes // SLEWS_A_CALL)))
-    flown = []
-    for start in range(0, episodes, num_devices * blocks * size):
-        rows = np.arange(start, start + num_devices * blocks * size) % episodes  # to fill the last
+    calls = math.ceil(episodes / SLEWS_A_CALL)
+    num_devices, blocks, size = _shape_of_call(math.ceil(episodes / calls))
+    a_call, flown = num_devices * blocks * size, []
+    for start in range(0, episodes, a_call):
+        rows = np.arange(start, start + a_call) % episodes  # to fill the last
         part = keys[rows].reshape(num_devices * blocks, size)
         flown.append(jax.device_get(fly_blocks(controller, env, params, part, num_devices)))
         if progress is not None:
-            progress(min(int(rows.size) + start, episodes))
+            progress(min(start + a_call, episodes))
     return jax.tree.map(lambda *x: np.concatenate(x).reshape(-1)[:episodes], *flown)
 
 
@@ -117,9 +119,9 @@ def _shape_of_call(slews):
     devices = sharding.devices()
     if devices[0].platform != "cpu":
         return 1, 1, slews
-    num_devices = min(len(devices), -(-slews // SLEWS_TOGETHER))
-    blocks = -(-slews // (num_devices * SLEWS_TOGETHER))
-    return num_devices, blocks, -(-slews // (num_devices * blocks))
+    num_devices = min(len(devices), math.ceil(slews / SLEWS_TOGETHER))
+    blocks = math.ceil(slews / (num_devices * SLEWS_TOGETHER))
+    return num_devices, blocks, math.ceil(slews / (num_devices * blocks))
 
 
 @functools.partial(

@@ -76,10 +76,12 @@ def test_the_reducer_is_a_call(call):
 
     lowered = jax.jit(jax.vmap(lambda *xs: call(deep, *xs))).lower(*jnp.ones((2, 8)))
     _, reducer = lowered.as_text().split("reducer(")
-    body = reducer[reducer.index("{") + 1 : reducer.index("}")]
-    assert body.count("call @deep") == 1
-    assert body.count("stablehlo.multiply") == 0
-    assert body.count("\n") < 40
+    body = reducer[reducer.index("{") + 1 : reducer.index("}")].split("\n")
+    operations = [line for line in body if line.strip()]
+    if call is one_kernel:  # which takes or leaves what the call gives, and nothing else
+        around = "stablehlo.constant", "stablehlo.compare", "call @_where"
+        operations = [line for line in operations if not any(x in line for x in around)]
+    assert len(operations) == 2 and "call @" in operations[0] and "return" in operations[1]
 
 
 def test_what_is_looked_up_comes_apart():
