@@ -22,7 +22,7 @@ from attjax import errors
 from attjax.config import command_line
 
 PACKAGES = ("jax", "jaxlib", "numpy", "numba", "bsk")
-MIN_TABLE_WIDTH = 120
+MIN_TABLE_WIDTH = 80
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,11 +33,13 @@ class Flight:
         call: flies, and returns when it is done.
         agent_steps: of all spacecraft in one call.
         compile_s: time that compilation took before the first call, None if there is none.
+        own_rate: if it times itself, its agent-steps/s over the seconds that it is given.
     """
 
     call: Callable[[], None]
     agent_steps: int
     compile_s: float | None = None
+    own_rate: Callable[[float], float] | None = None
 
 
 def seconds(function: Callable[[], object]) -> float:
@@ -63,6 +65,9 @@ def measure(flights: dict[str, Flight], repeats: int, repeat_s: float) -> dict[s
         calls[name] = math.ceil(repeat_s / seconds(flight.call))
     for _ in range(repeats):
         for name, flight in flights.items():
+            if flight.own_rate is not None:
+                rates[name].append(flight.own_rate(repeat_s))
+                continue
             duration = seconds(lambda: [flight.call() for _ in range(calls[name])])  # noqa: B023
             rates[name].append(calls[name] * flight.agent_steps / duration)
     return rates
@@ -145,12 +150,12 @@ def print_machine(description: dict) -> None:
 
 
 def print_table(columns: list[str], rows: list[list[str]], notes: list[str] = ()) -> None:
-    """Print a table, the first column left-aligned, and notes under it."""
+    """Print a table and notes under it: names to the left, on several lines if they must be."""
     console = Console(highlight=False)
     console.width = max(console.width, MIN_TABLE_WIDTH)
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
+    table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False)
     for index, column in enumerate(columns):
-        table.add_column(column, justify="right" if index else "left", no_wrap=True)
+        table.add_column(column, justify="right" if index else "left", no_wrap=index > 0)
     for row in rows:
         table.add_row(*row)
     console.print(table)

@@ -89,15 +89,15 @@ class PeerError(Exception):
 class Peer:
     """A trainer in a process of its own, with another interpreter, that works when it is asked."""
 
-    def __init__(self, python: str, runner: Path):
-        """Start the runner, a script that calls :func:`serve`.
+    def __init__(self, python: str, *runner: str | Path):
+        """Start the runner, a script that calls :func:`serve`, with its arguments.
 
         Raises:
             PeerError: the interpreter or a package is missing.
         """
         pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
         try:
-            self._process = subprocess.Popen([python, runner], text=True, **pipes)
+            self._process = subprocess.Popen([python, *runner], text=True, **pipes)
         except OSError as error:
             raise PeerError(f"{python}: {error.strerror}") from None
         self.versions = self._ask("versions")

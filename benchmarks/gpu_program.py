@@ -37,7 +37,7 @@ OPTIONS = {"xla_gpu_autotune_level": 0, "xla_gpu_enable_triton_gemm": False}
 """Neither measures kernels, which takes a card, nor compiles those that the oldest have not."""
 
 COLUMNS = ["", "compile\n(s)", "kernels", "launches\na unit", "memory\n(MiB)"]
-COLUMNS += ["bytes, operations\nat the peak (us a unit)", "bound\n(us a unit)"]
+COLUMNS += ["without\nlaunches\n(us a unit)", "bound\n(us a unit)"]
 
 
 class Program(NamedTuple):

@@ -17,7 +17,7 @@ FUSED, PHYSICS, USER = "attjax fused rollout", "attjax physics only", "attjax, u
 C_FULL, C_PHYSICS = "C ceiling, full step", "C ceiling, physics only"
 CEILINGS = (C_FULL, C_PHYSICS)
 NUMPY, NUMBA = "NumPy batch", "Numba batch"
-MAKE_VEC = "attjax, Gymnasium make_vec"
+MAKE_VEC, GYM_BENCHMARK = "attjax, Gymnasium make_vec", "benchmark_vector_step"
 GYM, BASILISK = "Numba RK4 in a Gym class", "Basilisk in an RL loop"
 
 
@@ -63,17 +63,20 @@ def _add_make_vec(found, absent):
     try:
         gymnasium = importlib.import_module("gymnasium")
     except ImportError:
-        absent[MAKE_VEC] = "not installed (pip install gymnasium)"
+        absent |= dict.fromkeys((MAKE_VEC, GYM_BENCHMARK), "not installed (pip install gymnasium)")
         return
     name = importlib.import_module("attjax.wrappers.gymnasium").ID
+    performance = importlib.import_module("gymnasium.utils.performance")
 
-    def build(num_envs):
+    def build(num_envs, times_itself):
         envs = gymnasium.make_vec(name, num_envs=num_envs)
         envs.reset(seed=0)
         call = functools.partial(envs.step, batch.random_actions(1, num_envs)[0])
-        return Flight(call, num_envs, seconds(call))
+        own_rate = functools.partial(performance.benchmark_vector_step, envs, seed=0)
+        return Flight(call, num_envs, seconds(call), own_rate if times_itself else None)
 
-    found.append(Contender(MAKE_VEC, build))
+    found.append(Contender(MAKE_VEC, functools.partial(build, times_itself=False)))
+    found.append(Contender(GYM_BENCHMARK, functools.partial(build, times_itself=True)))
 
 
 def _add_ceiling(found, absent):

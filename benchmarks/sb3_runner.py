@@ -1,5 +1,8 @@
 """Stable-Baselines3's PPO as a contender; training.py runs this file where it is installed."""
 
+import functools
+import os
+
 import gymnasium
 import torch
 from contenders import Workload, serve
@@ -20,9 +23,10 @@ def environment(num_envs: int):
     return as_vec_env(vector_env, PAPER_FAST.task.reward_scale, time_limit_terminates=True)
 
 
-def prepare(workload: Workload):
-    """A function that runs one update."""
-    model = PPO(
+def prepare(algorithm, relu, workload: Workload):
+    """A function that runs one update of an algorithm of Stable-Baselines3's kind."""
+    sizes = list(workload.hidden_sizes)
+    model = algorithm(
         "MlpPolicy",
         environment(workload.num_envs),
         learning_rate=PAPER_FAST.ppo.learning_rate,
@@ -34,10 +38,7 @@ def prepare(workload: Workload):
         clip_range=PAPER_FAST.ppo.clip,
         ent_coef=PAPER_FAST.ppo.entropy_coefficient,
         max_grad_norm=PAPER_FAST.ppo.max_gradient_norm,
-        policy_kwargs={
-            "net_arch": {"pi": list(workload.hidden_sizes), "vf": list(workload.hidden_sizes)},
-            "activation_fn": torch.nn.ReLU,
-        },
+        policy_kwargs={"net_arch": {"pi": sizes, "vf": sizes}, "activation_fn": relu},
         device="cpu",
     )
 
@@ -48,5 +49,5 @@ def prepare(workload: Workload):
 
 
 if __name__ == "__main__":
-    torch.set_num_threads(1)
-    serve(("stable-baselines3", "torch"), prepare)
+    torch.set_num_threads(len(os.sched_getaffinity(0)))
+    serve(("stable-baselines3", "torch"), functools.partial(prepare, PPO, torch.nn.ReLU))

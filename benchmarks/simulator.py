@@ -26,7 +26,7 @@ CEILING = 25e6
 
 COLUMNS = (
     "",
-    "\nspacecraft",
+    "space-\ncraft",
     "compile\n(s)",
     "agent-\nsteps/s",
     "\nrange",

@@ -228,8 +228,8 @@ def print_table(curves: dict) -> None:
             cells += [f"{point.seconds:.0f}", f"{point.agent_steps:,}"] if point else [never, "–"]
         best = min((point.mean_error for point in curve), default=float("nan"))
         rows.append([name, *cells, f"{best:.3g}"])
-    columns = [f"return {PLATEAU:,} (s)", "steps", "Table 2 beaten (s)", "steps"]
-    common.print_table(["", *columns, "least mean error (°)"], rows)
+    columns = [f"return\n{PLATEAU:,} (s)", "\nsteps", "Table 2\nbeaten (s)", "\nsteps"]
+    common.print_table(["", *columns, "least mean\nerror (°)"], rows)
 
 
 if __name__ == "__main__":
