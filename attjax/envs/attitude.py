@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Callable
 
 import chex
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -16,6 +15,7 @@ from attjax.envs import initial_state, simulator, spaces
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
 from attjax.envs.keys import observation_key, steps_key
+from attjax.envs.restart import restart_one
 from attjax.envs.reward import Transition, paper_reward
 from attjax.envs.simulator import EnvParams, EnvState
 from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
@@ -154,12 +154,9 @@ class AttitudeEnv:
             steps_key(key), state, action, params
         )
         truncated = info["truncated"]
-        fresh_observation, fresh_state = self.reset_env(key, params)
         info["final_observation"] = observation
-        observation, next_state = jax.tree.map(
-            lambda fresh, ongoing: jnp.where(terminated | truncated, fresh, ongoing),
-            (fresh_observation, fresh_state),
-            (observation, next_state),
+        observation, next_state = restart_one(
+            self.reset_env, (key, params), terminated | truncated, (observation, next_state)
         )
         return observation, next_state, reward, terminated, truncated, info
 

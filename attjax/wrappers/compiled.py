@@ -113,7 +113,9 @@ def step_batch_later_reset(
         step_keys, states, actions, params
     )
     observations, states = restart.restart(
-        lambda key, _: env.reset(key, params), reset_key, ended, (observations, states)
+        lambda row: env.reset(jax.random.fold_in(reset_key, row), params),
+        ended,
+        (observations, states),
     )
     results = [jnp.where(ended, jnp.zeros_like(x), x) for x in (*results, info["truncated"])]
     return key, states, (_described(info), _single(observations), *results)

@@ -1,4 +1,4 @@
-"""Batches: restarting only what ended, and the fused open-loop rollout."""
+"""Batches: their step, and the fused open-loop rollout."""
 
 import jax
 import jax.numpy as jnp
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from attjax import AttitudeEnv
-from attjax.envs import batch, restart
+from attjax.envs import batch
 
 ENV = AttitudeEnv(frameskip=5)
 CONTINUOUS = AttitudeEnv(frameskip=5, actions="continuous")
@@ -17,28 +17,6 @@ def fleet(count, max_steps=1750):
     params = ENV.default_params.replace(max_steps_in_episode=jnp.int32(max_steps))
     keys = jax.random.split(jax.random.key(1), count)
     return params, jax.vmap(ENV.reset, (0, None))(keys, params)[1]
-
-
-@pytest.mark.parametrize("by", [restart.restart, restart.restart_few, restart.restart_all])
-@pytest.mark.parametrize("ended_count", [0, 1, 5, 23, 40])
-def test_restart_replaces_all_that_ended_and_nothing_else(by, ended_count):
-    """Whether fewer end than are drawn at a time, or all; as CPUs do it, and as others."""
-    rows = jax.random.permutation(jax.random.key(0), 40)[:ended_count]
-    ended = jnp.zeros(40, bool).at[rows].set(True)
-
-    def reset(key, row):
-        return {"row": row, "number": jax.random.uniform(key), "vector": jnp.ones(3)}
-
-    ongoing = {
-        "row": jnp.full(40, -1),
-        "number": jnp.full(40, 2.0),
-        "vector": jnp.zeros((40, 3)),
-    }
-    after = jax.jit(by, static_argnums=0)(reset, jax.random.key(2), ended, ongoing)
-    np.testing.assert_array_equal(after["row"], jnp.where(ended, jnp.arange(40), -1))
-    np.testing.assert_array_equal(after["number"] == 2.0, ~ended)
-    np.testing.assert_array_equal(after["vector"], jnp.tile(ended[:, None], 3))
-    assert len(np.unique(after["number"][ended])) == ended_count
 
 
 def test_step_is_the_environment_s_own_but_for_the_fresh_episodes():
