@@ -74,7 +74,7 @@ class MLP(nn.Module):
 
     @nn.compact
     def __call__(self, x, axis=1):
-        """Map (samples, inputs), or whatever axis of two holds the inputs, to (outputs, samples)."""
+        """(outputs, samples) of (samples, inputs), or of whatever axis holds the inputs."""
         for size in self.hidden_sizes:
             x, axis = nn.relu(Dense(size, 2**0.5, self.initial_weights)(x, axis)), 0
         return Dense(self.outputs, self.output_scale, self.initial_weights)(x, axis)
