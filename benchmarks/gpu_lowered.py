@@ -28,7 +28,7 @@ def programs(preset: str, slews: int) -> list[tuple[str, int, Callable[[], jax.s
     """
     setup = build.setup(PRESETS[preset])
     settings, params, key = setup.settings.ppo, build.env_params(setup), jax.random.key(0)
-    learner = jax.eval_shape(functools.partial(train_state.init, setup), params, key)
+    learner = jax.eval_shape(functools.partial(train_state.init.__wrapped__, setup), params, key)
     env = AttitudeEnv(min(setup.settings.task.frameskips))
     limit = int(env.default_params.max_steps_in_episode)
     return [

@@ -42,8 +42,10 @@ class Terminal(Observer):
             f"({ppo.num_updates:,} updates of {ppo.steps_per_update:,}) on "
             f"{run.setup.num_devices} x {device.device_kind} ({device.platform}), in {self._folder}"
         )
-        if config.preset in presets.REMARKS:
-            print(presets.REMARKS[config.preset])
+        remarks = [presets.REMARKS]
+        if device.platform == "gpu":
+            remarks.append(presets.ON_A_GPU)
+        print(*(x[config.preset] + "\n" for x in remarks if config.preset in x), sep="", end="")
         if run.update:
             print(f"resumed at {run.agent_steps:,} agent steps")
 

@@ -42,8 +42,10 @@ def defaults(name: str) -> str:
     """A setting's value in the presets, once where they agree.
 
     Example:
-        >>> defaults("clip"), defaults("discount")
-        ('default: 0.2', 'precise, continuous: 0.995; paper, paper-gae, paper-fast: 0.99')
+        >>> defaults("clip")
+        'default: 0.2'
+        >>> defaults("discount")
+        'precise, precise-gpu, continuous: 0.995; paper, paper-gae, paper-fast: 0.99'
     """
     presets_of: dict[str, list[str]] = {}
     for preset, values in presets.PRESETS.items():

@@ -119,7 +119,7 @@ def entropy_coefficient(settings: PPO, update: chex.Array) -> chex.Array:
     return schedule(update)
 
 
-@functools.partial(jax.jit, static_argnames="setup")
+@functools.partial(jax.jit, static_argnames="setup", compiler_options=sharding.RUN_ONCE)
 def init(setup: Setup, env_params: chex.ArrayTree, key: chex.PRNGKey) -> Learner:
     """A learner at its start, for parameters as :class:`Setup` describes them."""
     start = functools.partial(_init_on_device, setup)

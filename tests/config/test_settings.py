@@ -29,7 +29,7 @@ def test_paper_presets_hold_what_the_paper_names():
 
 @pytest.mark.parametrize("preset", PRESETS.values())
 def test_settings_survive_json(preset):
-    chosen = preset.replace(num_envs=64, total_steps=123)
+    chosen = preset.replace(num_envs=600, total_steps=123)
     restored = settings.from_json(json.loads(json.dumps(dataclasses.asdict(chosen))))
     assert restored == chosen
 

@@ -183,7 +183,8 @@ def test_export_writes_only_its_own_files(tmp_path, capsys):
     assert {path.name for path in out.iterdir()} == {"main.c", *export_c.FILES}
     assert (out / "main.c").read_text() == "mine"
     header = (out / "attjax_policy.h").read_text()
-    assert "CONTROL_PERIOD 0.0875f" in header and "preset precise, seed 2, update 306" in header
+    assert "CONTROL_PERIOD 0.0875f" in header
+    assert "preset precise with num_envs 2048, seed 2, update 306" in header
 
 
 def test_bad_export_arguments(tmp_path, capsys):

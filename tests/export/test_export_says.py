@@ -103,7 +103,8 @@ def test_what_was_overridden_is_said(tmp_path):
     (run / "306" / "metrics" / "metrics").write_text('{"terminal_error_deg": 0.5}')
     header = export(run, tmp_path / "out", "--best")["attjax_policy.h"]
     said = " ".join(header.replace("\n *", " ").split())
-    assert "preset precise with rollout_length 32, passes 5, seed 2, update 306 of 611" in said
+    changed = "num_envs 2048, rollout_length 32, passes 5"
+    assert f"preset precise with {changed}, seed 2, update 306 of 611" in said
     assert "overridden: update 306, not the newest, 310" in said
     assert "overridden:  nothing" in export(run, tmp_path / "newest")["attjax_policy.h"]
     flight = exported.load(PRECISE, 5)
