@@ -102,15 +102,17 @@ FAULTS = {
         "attjax/runs/build.py", "rate_limit=margin * params.rate_limit",
         "rate_limit=params.rate_limit", ["tests/test_continuous_runs.py"],
     ),
-    "reset state cached": (
-        "attjax/envs/attitude.py", "fresh_observation, fresh_state = self.reset_env(key, params)",
-        "fresh_observation, fresh_state = self.reset_env(jax.random.key(0), params)",
-        ["tests/envs/test_attitude.py"],
+    "all of a mapped step restart alike": (
+        "attjax/envs/restart.py", "lambda x, own: x[row] if own else x, given",
+        "lambda x, own: x[0] if own else x, given", ["tests/envs/test_restart.py"],
     ),
-    "reset state cached in the fused rollout": (
-        "attjax/envs/restart.py",
-        "fresh = jax.vmap(reset)(jax.random.split(fresh_key, portion), rows)",
-        "fresh = jax.vmap(reset)(jax.random.split(jax.random.key(0), portion), rows)", LEARNING,
+    "all of a fused rollout restart alike": (
+        "attjax/envs/batch.py", "jax.random.fold_in(fresh_key, row)",
+        "jax.random.fold_in(fresh_key, 0)", LEARNING,
+    ),
+    "a mapped step restarts whoever goes on": (
+        "attjax/envs/restart.py", "jnp.where(ended, new, old), reset(*given), ongoing)",
+        "jnp.where(ended, old, new), reset(*given), ongoing)", ["tests/envs/test_restart.py"],
     ),
     "devices draw the same numbers": (
         "attjax/ppo/rollout.py",
