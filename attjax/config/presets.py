@@ -116,7 +116,7 @@ PRECISE = Settings(
 """The default: one policy for every control rate, pointing far below Table 2."""
 
 PRECISE_GPU = PRECISE.replace(num_envs=2048, minibatch_size=8192, learning_rate=4e-3)
-"""``precise`` for a GPU: an eighth of the gradient steps an update, each a number of launches.
+"""``precise`` for a GPU: an eighth of the gradient steps, each of which is many launches.
 
 On CPU it comes out as precise and settles 1 % later (docs/tuning.md); Table 2 is beaten later, too.
 """
@@ -149,5 +149,5 @@ REMARKS = {
 }
 """What whoever starts a run should know of its preset, as measured (docs/reproduction.md)."""
 
-ON_A_GPU = {"precise": "on a GPU, --preset precise-gpu launches a fifth as many kernels"}
+ON_A_GPU = {"precise": "on a GPU, --preset precise-gpu launches a quarter of the kernels"}
 """What else, where the device is a GPU (docs/gpu.md)."""

@@ -80,6 +80,9 @@ def restart_one(
         ongoing: pytree.
     """
 
+    reset, closed_over = jax.closure_convert(reset, *given)
+    given = (*given, *closed_over)
+
     def of_one(given, ended, ongoing):
         return jax.tree.map(lambda new, old: jnp.where(ended, new, old), reset(*given), ongoing)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from attjax import AttitudeEnv
-from attjax.envs import restart
+from attjax.envs import initial_state, restart
 
 ENV = AttitudeEnv(frameskip=5)
 PARAMS = ENV.default_params.replace(max_steps_in_episode=jnp.int32(3))
@@ -95,6 +95,22 @@ def test_a_mapped_step_draws_only_for_those_that_ended():
     assert "top_k" in text
     text = step.trace(*fleet(), PARAMS).lower(lowering_platforms=("cuda",)).as_text()
     assert "top_k" not in text
+
+
+def test_a_start_may_hang_on_what_is_differentiated():
+    """A closure of the environment's, over a number that ``grad`` follows."""
+
+    def total(rate):
+        def moving(key, params):
+            state = initial_state.initial_state(key, params)
+            return state.replace(angular_velocity=jnp.full(3, rate))
+
+        env = AttitudeEnv(frameskip=5, initial_state=moving)
+        keys, states, actions = fleet()
+        _, after, *_ = jax.vmap(env.step, AXES)(keys, states, actions, PARAMS)
+        return jnp.sum(after.angular_velocity[2::3])
+
+    assert jax.grad(total)(0.1) == pytest.approx(3 * (COUNT // 3))
 
 
 @pytest.mark.parametrize("gradient", [jax.grad, jax.jacfwd])
