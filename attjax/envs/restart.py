@@ -79,7 +79,6 @@ def restart_one(
         ended: () bool.
         ongoing: pytree.
     """
-
     reset, closed_over = jax.closure_convert(reset, *given)
     given = (*given, *closed_over)
 
