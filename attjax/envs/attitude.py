@@ -44,6 +44,7 @@ class AttitudeEnv:
             value is not as said, or actions are continuous with torques along no body axis.
 
     Example:
+        >>> import jax
         >>> env = AttitudeEnv(frameskip=20)
         >>> obs, state = env.reset(jax.random.key(0), env.default_params)
         >>> obs.shape
