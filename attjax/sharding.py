@@ -13,11 +13,8 @@ AXIS = "devices"
 SHARED, SPLIT = PartitionSpec(), PartitionSpec(AXIS)
 """What is the same on all devices, and what is split along its first axis."""
 
-COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512, "xla_backend_optimization_level": 2}
-"""For outermost jitted functions only: JAX refuses options on a function called in another.
-
-At LLVM's level 2 they run as fast as at 3, and are compiled in two thirds of the time or more.
-"""
+COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512}
+"""For outermost jitted functions only: JAX refuses options on a function called in another."""
 
 RUN_ONCE = {"xla_backend_optimization_level": 0}
 """The same for a program that runs once, for which the shortest compilation is the best."""

@@ -73,8 +73,9 @@ class MLP(nn.Module):
     initial_weights: str = "orthogonal"
 
     @nn.compact
-    def __call__(self, x, axis=1):
-        """(outputs, samples) of (samples, inputs), or of whatever axis holds the inputs."""
+    def __call__(self, samples):
+        """Map (samples, inputs) to (outputs, samples)."""
+        x, axis = samples, 1
         for size in self.hidden_sizes:
             x, axis = nn.relu(Dense(size, 2**0.5, self.initial_weights)(x, axis)), 0
         return Dense(self.outputs, self.output_scale, self.initial_weights)(x, axis)
@@ -145,15 +146,12 @@ class Policy:
             allowed = assurance.rate_mask(context, self.rate_margin).allowed(angular_velocity)
         return Inputs(features, allowed)
 
-    def outputs(self, params: dict, inputs: Inputs, axis: int = 1) -> chex.Array:
-        """(outputs, samples) of (samples, ...) inputs: logits are MASKED_LOGIT where masked.
-
-        With ``axis`` 0, inputs have a column for each sample.
-        """
-        outputs: chex.Array = self.policy_network.apply(params["policy"], inputs.features, axis)
+    def outputs(self, params: dict, inputs: Inputs) -> chex.Array:
+        """(outputs, samples) of (samples, ...) inputs: logits are MASKED_LOGIT where masked."""
+        outputs: chex.Array = self.policy_network.apply(params["policy"], inputs.features)
         if inputs.allowed is None:
             return outputs
-        return jnp.where(inputs.allowed.T if axis else inputs.allowed, outputs, MASKED_LOGIT)
+        return jnp.where(inputs.allowed.T, outputs, MASKED_LOGIT)
 
     def distribution(self, params: dict, inputs: Inputs) -> Categorical | Gaussian:
         """What the actions are drawn from, of (samples, ...) inputs."""
@@ -165,7 +163,7 @@ class Policy:
 
     def act(self, params: dict, observation: chex.Array, context: Context) -> chex.Array:
         """The most probable action for one observation: int32, or (3,) fractions."""
-        return self._decided(params, observation, context, None)
+        return self._decided(params, self.encode(observation, context), None)
 
     def draw(
         self, params: dict, key: chex.PRNGKey, observation: chex.Array, context: Context
@@ -177,55 +175,45 @@ class Policy:
         for word in jax.lax.bitcast_convert_type(observation.astype(jnp.float32), jnp.uint32):
             key = jax.random.fold_in(key, word)
         noise = self.distribution_family.noise(key, (), observation.dtype)
-        return self._decided(params, observation, context, noise)
+        return self._decided(params, self.encode(observation, context), noise)
 
-    def _decided(self, params, observation, context, noise):
-        """The action for one observation: drawn, or the mode where there is no noise.
+    def _decided(self, params, inputs, noise):
+        """The action for one spacecraft's inputs: drawn, or the mode where there is no noise."""
 
-        Of a batch, inputs are columns: tanh of multi-scale inputs, and the product with the first
-        kernel, take three fifths of the time that they take of rows.
-        """
-
-        def decide(params, axes, samples):
-            observation, context, noise = samples
-            inputs = jax.vmap(self.encode, axes[:2], out_axes=-1)(observation, context)
-            outputs = self.outputs(params, inputs, axis=0)
+        def decide(params, samples):
+            inputs, noise = samples
+            outputs = self.outputs(params, inputs)
             if noise is None:
                 return self.distribution_family.mode_of(outputs)
             return self.distribution_family.of(outputs).draw(noise)
 
-        return _one_of_a_batch(decide)(params, (observation, context, noise))
+        return _one_of_a_batch(decide)(params, (inputs, noise))
 
 
-def _one_of_a_batch(decide):
-    """A function of parameters and a batch of samples, and their axes, as one of a single sample.
+def _one_of_a_batch(function):
+    """A function of parameters and samples (samples, ...) as one of a single sample.
 
     Under ``vmap`` it is the function of the batch. By itself ``vmap`` would make of a network's
     layers for a batch of one some that transpose all they compute, which takes twice as long.
-    What is the same for all samples, and has no axis, is the context; the rest has one.
     """
 
     def of_one(params, sample):
-        observation, context, noise = sample
-        first = jax.tree.map(lambda x: x[None], (observation, noise))
-        axes = 0, jax.tree.map(lambda _: None, context), 0
-        return decide(params, axes, (first[0], context, first[1]))[0]
+        batch_of_one = jax.tree.map(lambda x: x[None], sample)
+        return function(params, batch_of_one)[0]
 
     batched = jax.custom_batching.custom_vmap(of_one)
 
     @batched.def_vmap
     def _of_a_batch(size, is_batched, params, sample):
-        axes = jax.tree.map(lambda x: 0 if x else None, is_batched)
         if any(jax.tree.leaves(is_batched[0])):
+            axes = jax.tree.map(lambda x: 0 if x else None, is_batched)
             return jax.vmap(of_one, axes, axis_size=size)(params, sample), True
-        observation, context, noise = sample
-        observation, noise = jax.tree.map(
+        samples = jax.tree.map(
             lambda x, is_one_each: x if is_one_each else jnp.broadcast_to(x, (size, *x.shape)),
-            (observation, noise),
-            (is_batched[1][0], is_batched[1][2]),
+            sample,
+            is_batched[1],
         )
-        axes = 0, axes[1][1], 0
-        return decide(params, axes, (observation, context, noise)), True
+        return function(params, samples), True
 
     with_gradients = jax.custom_jvp(batched)  # of the batched form JAX has none in reverse
 
