@@ -42,10 +42,10 @@ class Terminal(Observer):
             f"({ppo.num_updates:,} updates of {ppo.steps_per_update:,}) on "
             f"{run.setup.num_devices} x {device.device_kind} ({device.platform}), in {self._folder}"
         )
-        remarks = [presets.REMARKS]
-        if device.platform == "gpu":
-            remarks.append(presets.ON_A_GPU)
-        print(*(x[config.preset] + "\n" for x in remarks if config.preset in x), sep="", end="")
+        if config.preset in presets.REMARKS:
+            print(presets.REMARKS[config.preset])
+        if device.platform == "gpu" and config.preset in presets.ON_A_GPU:
+            print(presets.ON_A_GPU[config.preset])
         if run.update:
             print(f"resumed at {run.agent_steps:,} agent steps")
 
