@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from attjax.envs.attitude import AttitudeEnv
     from attjax.envs.batch import open_loop
-    from attjax.envs.simulator import EnvParams, EnvState, step
+    from attjax.envs.parameters import EnvParams, EnvState
+    from attjax.envs.simulator import step
     from attjax.evaluation import evaluate
     from attjax.runs.checkpoint import load_policy
     from attjax.runs.trainer import train
     from attjax.spacecraft import LM50, Spacecraft
+    from attjax.world import World
 
 __all__ = [
     "LM50",
@@ -18,6 +20,7 @@ __all__ = [
     "EnvParams",
     "EnvState",
     "Spacecraft",
+    "World",
     "evaluate",
     "load_policy",
     "open_loop",
@@ -28,10 +31,11 @@ __version__ = "0.1.0"
 
 _MODULES = {
     "AttitudeEnv": "attjax.envs.attitude",
-    "EnvParams": "attjax.envs.simulator",
-    "EnvState": "attjax.envs.simulator",
+    "EnvParams": "attjax.envs.parameters",
+    "EnvState": "attjax.envs.parameters",
     "LM50": "attjax.spacecraft",
     "Spacecraft": "attjax.spacecraft",
+    "World": "attjax.world",
     "evaluate": "attjax.evaluation",
     "load_policy": "attjax.runs.checkpoint",
     "open_loop": "attjax.envs.batch",

@@ -7,7 +7,7 @@ import numpy as np
 
 import attjax
 from attjax import AttitudeEnv
-from attjax.envs import initial_state, simulator
+from attjax.envs import initial_state, parameters
 from attjax.envs.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
 from attjax.spacecraft import INTEGRATION_STEP, LM50
 
@@ -38,10 +38,10 @@ class Batch:
         self.ended = _aligned((self.size,), INTEGER)
         self.quaternion[:] = np.asarray(state.quaternion).T
 
-    def state(self) -> simulator.EnvState:
+    def state(self) -> parameters.EnvState:
         """The state as attjax has it."""
         arrays = self.quaternion.T, self.angular_velocity.T, self.time
-        return simulator.EnvState(*(jax.numpy.array(np.array(x)) for x in arrays))
+        return parameters.EnvState(*(jax.numpy.array(np.array(x)) for x in arrays))
 
 
 def _aligned(shape, kind):

@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 
-from attjax.envs import simulator
+from attjax.envs import parameters
 from attjax.envs.reward import OVERSPEED_PENALTY, TERMINAL_BONUS
 from attjax.spacecraft import LM50
 
 FRAMESKIP = 20
 INERTIA = np.array(LM50.inertia)
 TORQUES = np.array(LM50.torque_table)
-PARAMS = simulator.default_params(FRAMESKIP)
+PARAMS = parameters.default_params(FRAMESKIP)
 RATE_LIMIT, GOAL_ANGLE = float(PARAMS.rate_limit), float(PARAMS.goal_angle)
 MAX_STEPS = int(PARAMS.max_steps_in_episode)
 SLEW_ANGLES = float(PARAMS.min_slew_angle), float(PARAMS.max_slew_angle)

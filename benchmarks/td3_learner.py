@@ -19,7 +19,7 @@ from flax import struct
 from rejax.networks import DeterministicPolicy, QNetwork
 
 from attjax import AttitudeEnv
-from attjax.envs.simulator import EnvState
+from attjax.envs.parameters import EnvState
 from attjax.runs import foreign
 from attjax.wrappers.gymnax import FiveValueEnv
 

@@ -33,11 +33,11 @@ PLAUSIBLE = {"--" + name.replace("_", "-"): value for name, value in presets.PRE
 PLAUSIBLE |= {
     "--preset": "paper", "--seed": 1, "--save-every": 2.5, "--frameskip": 7, "--duration": 1.5,
     "--controller": "feedback", "--json": "result.json", "--plot": "figures", "--episodes": 3,
-    "--playback": "slews.html",
+    "--playback": "slews.html", "--world": "ideal",
 }  # fmt: skip
-TRAIN_FLAGS = [*SETTINGS, "--preset", "--seed", "--save-every", "--nonsense"]
+TRAIN_FLAGS = [*SETTINGS, "--preset", "--seed", "--save-every", "--world", "--nonsense"]
 EVAL_FLAGS = ["--episodes", "--frameskip", "--duration", "--seed", "--controller"]
-EVAL_FLAGS += ["--json", "--plot", "--playback", "--nonsense"]
+EVAL_FLAGS += ["--world", "--json", "--plot", "--playback", "--nonsense"]
 TRAIN_SWITCHES = [
     ["--resume"],
     ["--overwrite"],

@@ -11,7 +11,7 @@ from pages import embedded
 
 import attjax
 from attjax import AttitudeEnv, EnvState, Spacecraft, evaluation
-from attjax.envs import simulator
+from attjax.envs import torques
 from attjax.evaluation import plots
 from attjax.evaluation.playback import page as playback
 from attjax.export import flight_check
@@ -23,8 +23,8 @@ PUSH = jax.tree_util.Partial(lambda observation, context: jnp.array(7))  # 0.05 
 
 def test_all_see_the_torque_that_one_function_gives(monkeypatch):
     """Of actuators of half the strength."""
-    given = simulator.applied_torque
-    monkeypatch.setattr(simulator, "applied_torque", lambda *args: given(*args) / 2)
+    given = torques.applied_torque
+    monkeypatch.setattr(torques, "applied_torque", lambda *args: given(*args) / 2)
     env = AttitudeEnv(2, reward=lambda transition: transition.impulse[0])  # no other test flies it
     start = EnvState(jnp.array([0.6, 0.0, 0.0, 0.8]), jnp.zeros(3), jnp.array(0, jnp.int32))
     params = env.default_params.replace(max_steps_in_episode=jnp.array(8, jnp.int32))

@@ -17,7 +17,7 @@ from scipy.special import ellipj, ellipk
 import attjax
 from attjax import dynamics, spacecraft
 from attjax.dynamics import quaternion
-from attjax.envs import simulator
+from attjax.envs import parameters
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -34,7 +34,7 @@ def random_actions(frameskip, *shape):
 
 def flight(start, actions, inertia, frameskip):
     """States (1 + steps, 7) before and after each agent step."""
-    params = simulator.default_params(frameskip).replace(inertia=jnp.asarray(inertia, float))
+    params = parameters.default_params(frameskip).replace(inertia=jnp.asarray(inertia, float))
 
     def step(state, action):
         state = attjax.step(state, action, params, frameskip)

@@ -2,20 +2,18 @@
 
 import argparse
 import contextlib
-import dataclasses
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from attjax import destinations, devices, errors
-from attjax.commands import evaluation_output
-from attjax.config import command_line, fields, toml
-from attjax.runs import folder as run_folder
-from attjax.spacecraft import INTEGRATION_STEP, LM50, MOST_DURATION
+from attjax.commands import evaluation_output, evaluation_subject
+from attjax.commands.evaluation_subject import POLICY
+from attjax.config import command_line, fields
+from attjax.spacecraft import MOST_DURATION
 from attjax.values import ACTIONS
 
-POLICY = "policy"
 STDOUT = Path("-")
 CLASSICAL = ("phase-plane", "feedback")
 USAGE = "%(prog)s [--checkpoint FOLDER | --controller NAME] [--compare] [FLAG ...]"
@@ -73,6 +71,7 @@ def _add_conditions(group):
         "LM50 for a classical controller)"
     )
     group.add_argument("--spacecraft", type=command_line.path, metavar="FILE", help=craft_help)
+    command_line.add_world(group, "that of the policy's training; ideal for a classical controller")
     duration_help = "length of an episode (default: the spacecraft's; LM50's is 43.75)"
     limits = {"above": 0, "high": MOST_DURATION}
     command_line.add_number(group, "duration", float, None, duration_help, unit="s", **limits)
@@ -99,12 +98,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     with errors.one_line_errors(), errors.enough_memory(advice):
         devices.select_device(arguments.device)
         names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
-        config = _config(arguments, names)
+        config = evaluation_subject.config(arguments, names)
         trained = config.settings.task.frameskips if config else None
         if arguments.frameskip is None:
             arguments.frameskip = fields.frameskip_to_judge(trained or ())
-        spacecraft = _spacecraft(arguments, config)
-        env = _env(arguments, config, spacecraft)
+        spacecraft = evaluation_subject.spacecraft(arguments, config)
+        env = evaluation_subject.env(arguments, config, spacecraft)
         controllers = {name: _controller(name, arguments, env, config) for name in names}
         if arguments.json not in (None, STDOUT):
             destinations.check("--json", arguments.json)
@@ -172,55 +171,6 @@ def _write_playback(arguments, controllers, env, params):
     checkpoint = arguments.checkpoint.resolve().name if name == POLICY else None
     page = playback.page(shown, env, params, arguments.seed or 0, checkpoint)
     evaluation_output.write_text(arguments.playback, page)
-
-
-def _config(arguments, names):
-    """The policy's run; None where there is no policy."""
-    if arguments.frameskip is not None:
-        _check_duration(arguments.duration, arguments.frameskip)
-    config = run_folder.read_config(arguments.checkpoint) if POLICY in names else None
-    if arguments.sampled and config is None:
-        raise errors.UserError(f"--sampled is for a policy; {names[0]} draws nothing")
-    if config and arguments.actions not in (None, config.settings.task.actions):
-        raise errors.UserError(
-            f"--actions is {arguments.actions}; the policy in {arguments.checkpoint} was trained "
-            f"with {config.settings.task.actions} ones, and what is judged beside it has the same"
-        )
-    return config
-
-
-def _spacecraft(arguments, config):
-    """What flies, with the duration that was asked for."""
-    if arguments.spacecraft is not None:
-        spacecraft = toml.read_spacecraft(arguments.spacecraft)
-    else:
-        spacecraft = config.spacecraft if config else LM50
-    if arguments.duration is not None:
-        try:
-            spacecraft = dataclasses.replace(spacecraft, duration=arguments.duration)
-        except ValueError as error:
-            raise errors.UserError(f"--duration {arguments.duration:g}: {error}") from None
-    _check_duration(spacecraft.duration, arguments.frameskip)
-    return spacecraft
-
-
-def _check_duration(duration, frameskip):
-    period = (frameskip + 1) * INTEGRATION_STEP
-    if duration is not None and duration < period * (1 - 1e-6):
-        raise errors.UserError(
-            f"--duration is {duration} s; it must hold at least one agent step of {period:.4g} s"
-        )
-
-
-def _env(arguments, config, spacecraft):
-    """The simulator that all controllers fly, by the rules of the policy's training."""
-    # Imported late: with it, --help and errors in the arguments would take seconds.
-    from attjax.runs import build
-
-    rules = {"actions": arguments.actions or "discrete"}
-    if config:
-        rules = build.rules(config.settings.task)
-    return build.environment(arguments.frameskip, spacecraft, rules)
 
 
 def _controller(name, arguments, env, config):

@@ -38,6 +38,7 @@ def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     groups["task"].add_argument(
         "--spacecraft", type=command_line.path, metavar="FILE", help=craft_help
     )
+    command_line.add_world(groups["task"], "ideal")
     for name, group in groups.items():
         command_line.add_settings(group, name)
     _add_run(groups["run"])
@@ -52,7 +53,9 @@ def _add_run(group):
     existing.add_argument("--resume", action="store_true", help=resume_help)
     existing.add_argument("--overwrite", action="store_true", help="replace the folder's run")
     command_line.add_seed_and_device(group, "seed of everything random")
-    config_help = "TOML file with preset, seed, [settings] and [spacecraft]; flags override it"
+    config_help = (
+        "TOML file with preset, seed, [settings], [spacecraft] and [world]; flags override it"
+    )
     group.add_argument("--config", type=command_line.path, metavar="FILE", help=config_help)
     print_help = "print the file that reproduces this run, and end"
     group.add_argument("--print-config", action="store_true", help=print_help)
@@ -117,4 +120,6 @@ def _given(arguments):
             given[name] = getattr(arguments, name)
     if arguments.spacecraft is not None:
         given["spacecraft"] = toml.read_spacecraft(arguments.spacecraft)
+    if arguments.world is not None:
+        given["world"] = toml.read_world(arguments.world)
     return given | command_line.overrides(arguments)

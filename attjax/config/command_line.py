@@ -84,6 +84,12 @@ def add_seed_and_device(group: Group, seed_help: str) -> None:
     group.add_argument("--device", choices=DEVICES, default="auto", help=device_help)
 
 
+def add_world(group: Group, default: str) -> None:
+    """Add --world."""
+    world_help = f"name or TOML file of the world that is flown in (default: {default})"
+    group.add_argument("--world", metavar="NAME|FILE", help=world_help)
+
+
 def add_frameskip(group: Group, meaning: str) -> None:
     """Add --frameskip, None where it is not given: one that suits the policy is chosen then."""
     table_2 = fields.TABLE_2

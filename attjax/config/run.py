@@ -8,6 +8,7 @@ from attjax.config.presets import PRECISE, PRESETS
 from attjax.config.settings import Settings
 from attjax.errors import UserError
 from attjax.spacecraft import LM50, Spacecraft
+from attjax.world import IDEAL, World
 
 DEFAULT_PRESET = "precise"
 CUSTOM = "custom"
@@ -25,13 +26,14 @@ class Config:
     """What a run was started with.
 
     Raises:
-        ValueError: an agent step takes longer than the spacecraft's episode.
+        ValueError: an agent step, or a delay, takes longer than the spacecraft's episode.
     """
 
     preset: str
     seed: int
     settings: Settings
     spacecraft: Spacecraft = LM50
+    world: World = IDEAL
 
     def __post_init__(self):
         object.__setattr__(self, "seed", operator.index(self.seed))
@@ -41,12 +43,46 @@ class Config:
                 f"frameskips holds {longest}; in {self.spacecraft.duration} s, the duration of an "
                 f"episode, it must be at most {self.spacecraft.most_frameskip}"
             )
+        check_world(self.world, self.spacecraft)
+
+
+def check_world(world: World, spacecraft: Spacecraft) -> None:
+    """Check that a spacecraft can fly in a world.
+
+    Raises:
+        ValueError: its episode is shorter than a delay, it lacks a level or an axis, or the world
+            has what no file can describe.
+    """
+    if world.own_disturbances:
+        raise ValueError("a world with own_disturbances cannot be kept with a run")
+    actuators = world.actuators
+    if actuators is None:
+        return
+    most = spacecraft.most_frameskip
+    if actuators.most_delay > most:
+        raise ValueError(
+            f"actuators.delay and delay_jitter come to {actuators.most_delay:g}; in an episode of "
+            f"{spacecraft.duration:g} s they must be at most {most}"
+        )
+    for name, of in (("dead_levels", "torque_levels"), ("faulty_axes", "torque_axes")):
+        count = len(getattr(spacecraft, of))
+        if any(number > count for number in getattr(actuators, name)):
+            raise ValueError(
+                f"actuators.{name} holds {max(getattr(actuators, name))}; "
+                f"{spacecraft} has {count} {of}"
+            )
 
 
 def new(
-    preset: str = DEFAULT_PRESET, seed: int = 0, spacecraft: Spacecraft = LM50, **values: Any
+    preset: str = DEFAULT_PRESET,
+    seed: int = 0,
+    spacecraft: Spacecraft = LM50,
+    world: World | str = IDEAL,
+    **values: Any,
 ) -> Config:
     """The configuration of a new run: a preset, but for settings given by name.
+
+    The world may be one of the named ones.
 
     Raises:
         ValueError: the preset is unknown, or something is not as :class:`Settings` says.
@@ -57,7 +93,8 @@ def new(
     """
     if preset not in (*PRESETS, CUSTOM):
         raise ValueError(f"preset is {preset!r}; it must be one of {', '.join(PRESETS)}")
-    return Config(preset, seed, PRESETS.get(preset, PRECISE).replace(**values), spacecraft)
+    settings = PRESETS.get(preset, PRECISE).replace(**values)
+    return Config(preset, seed, settings, spacecraft, World.of(world))
 
 
 def lengthened(config: Config, given: dict) -> Config:
@@ -65,7 +102,7 @@ def lengthened(config: Config, given: dict) -> Config:
 
     Args:
         config: of the run.
-        given: preset, seed, spacecraft and settings, by name, that it is to be continued with.
+        given: preset, seed, spacecraft, world, settings, by name, that it is to be continued with.
 
     Raises:
         UserError: one of them is not the run's, the total is smaller, or the run is no PPO's.
@@ -77,6 +114,8 @@ def lengthened(config: Config, given: dict) -> Config:
     before = config.settings.ppo.total_steps
     total = given.get("total_steps", before)
     run = vars(config) | config.settings.flat | {"total_steps": total}
+    if "world" in given:
+        given = given | {"world": World.of(given["world"])}
     differing = [name for name, value in given.items() if run[name] != value]
     if differing:
         listed = ", ".join(f"{name} ({run[name]})" for name in differing)

@@ -13,6 +13,8 @@ from attjax.config import fields, help_text, presets, settings
 from attjax.config.run import Config
 from attjax.errors import UserError
 from attjax.spacecraft import Spacecraft
+from attjax.world import World, names
+from attjax.world.distributions import KINDS
 
 SETTINGS = settings.FIELDS
 OTHERS = (
@@ -23,7 +25,7 @@ FIELDS = SETTINGS | {field.name: field for field in OTHERS}
 
 
 def read(path: Path) -> dict:
-    """The preset, seed, settings and spacecraft that a file gives, by name; it need not give all.
+    """Preset, seed, settings, spacecraft and world of a file, by name; it need not give all.
 
     Raises:
         UserError: it cannot be read, or something in it is unknown or out of range.
@@ -31,6 +33,7 @@ def read(path: Path) -> dict:
     with _one_line(f"--config {path}"):
         content = specification.read_toml(path)
     spacecraft = content.pop("spacecraft", None)
+    world = content.pop("world", None)
     given = content.pop("settings", {})
     if not isinstance(given, dict):
         raise UserError(f"--config {path}: settings must be a table, [settings]")
@@ -41,6 +44,8 @@ def read(path: Path) -> dict:
         given = {k: fields.check(FIELDS[k], v) for k, v in (given | content).items()}
         if spacecraft is not None:
             given["spacecraft"] = specification.from_lists(spacecraft, specification.NEEDED)
+        if world is not None:
+            given["world"] = World.of(world if isinstance(world, str) else World.from_lists(world))
     return given
 
 
@@ -52,6 +57,23 @@ def read_spacecraft(path: Path) -> Spacecraft:
     """
     with _one_line(f"--spacecraft {path}"):
         return Spacecraft.from_toml(path)
+
+
+def read_world(name_or_path: str) -> World:
+    """The world of ``--world``: one of the named ones, or that of a file.
+
+    Raises:
+        UserError: there is none of that name, or the file cannot be read or describes none.
+    """
+    if name_or_path in names():
+        return World.named(name_or_path)
+    path = Path(name_or_path).expanduser()
+    if not path.exists() and not path.suffix:
+        raise UserError(
+            f"--world is {name_or_path}; it must be {' or '.join(names())}, or a TOML file"
+        )
+    with _one_line(f"--world {path}"):
+        return World.from_toml(path)
 
 
 @contextlib.contextmanager
@@ -83,7 +105,19 @@ def text(config: Config) -> str:
     lines += ["", "[spacecraft]", "# kg m^2, N m, rad/s, degrees and s; body frame"]
     values = dataclasses.asdict(config.spacecraft)
     lines += [f"{name} = {_toml(value)}" for name, value in values.items()]
+    if not config.world.is_ideal:
+        lines += _tables("world", config.world.table())
     return "\n".join(lines) + "\n"
+
+
+def _tables(name, values):
+    """A table and those in it, but for distributions, which stand in one line each."""
+    nested = {x: y for x, y in values.items() if isinstance(y, dict) and not KINDS.keys() & y}
+    lines = ["", f"[{name}]"]
+    lines += [f"{x} = {_toml(y)}" for x, y in values.items() if x not in nested]
+    for inner, table in nested.items():
+        lines += _tables(f"{name}.{inner}", table)
+    return lines
 
 
 def _comment(field):
@@ -94,5 +128,7 @@ def _comment(field):
 
 def _toml(value):
     """A value, in ASCII whatever the terminal; JSON's escapes of it would be no TOML's."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{name} = {_toml(x)}" for name, x in value.items()) + " }"
     shown = json.dumps(value, ensure_ascii=False)
     return "".join(c if c.isascii() else f"\\U{ord(c):08x}" for c in shown)

@@ -15,7 +15,7 @@ from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
 from attjax.dynamics.numerics import squared_norm
 from attjax.envs import observation as observations
-from attjax.envs import simulator
+from attjax.envs import torques
 from attjax.envs.context import Context
 
 BRAKING_MARGIN = 0.75
@@ -111,7 +111,7 @@ def nearest_action(
 
 def _over(vector, context):
     """A (3,) vector over the largest torque about each axis; 0 where there is none."""
-    largest = simulator.largest_torques(context.torque_table)
+    largest = torques.largest_torques(context.torque_table)
     return jnp.where(largest > 0, vector / jnp.where(largest > 0, largest, 1), 0)
 
 

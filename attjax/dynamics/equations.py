@@ -153,6 +153,22 @@ class EquationsOfMotion(NamedTuple):
         """The same with the commanded torque off."""
         return self._replace(torque=None)
 
+    steps_together = 7
+    """RK4 steps in one loop over a batch, or in one kernel: three such are the paper's 21."""
+
+    is_timed = False
+    """Whether they are told which RK4 step of an agent step it is, counted from 0."""
+
+    def during(self, number: Any, state: RigidState) -> "EquationsOfMotion":
+        """The equations of that RK4 step, which begins with this state: here always the same."""
+        del number, state
+        return self
+
+    def after(self, number: Any, change: RigidState) -> RigidState:
+        """What is kept of the change from the agent step's start to that RK4 step's end: all."""
+        del number
+        return change
+
     def rate(self, state: RigidState) -> RigidState:
         """Rate of change of the state."""
         acceleration = self.gyroscopic.acceleration(state.angular_velocity)

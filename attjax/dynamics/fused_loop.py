@@ -1,5 +1,6 @@
 """Many outputs in one pass over a batch, which XLA's compilers do not do by themselves."""
 
+import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
@@ -115,6 +116,26 @@ def _reduced(scalars, count, reducer):
     copies = tuple(jnp.broadcast_to(x, (count,)) for x in scalars)
     zeros = tuple(jnp.zeros((), x.dtype) for x in scalars)
     return jax.lax.reduce(copies, zeros, reducer, (0,))
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
+def together(function: Callable[..., Tree], *operands: Any) -> Tree:
+    """``function(*operands)``, as of :func:`one_loop` where the device is a CPU.
+
+    For what several things share that are worked out of it; it has the function's derivatives.
+
+    Example:
+        >>> float(jax.grad(lambda x: together(lambda y: y**3, x))(2.0))
+        12.0
+    """
+    return jax.lax.platform_dependent(
+        *operands, cpu=functools.partial(one_loop, function), default=function
+    )
+
+
+@together.defjvp
+def _together_jvp(function, primals, tangents):
+    return jax.jvp(function, primals, tangents)
 
 
 @jax.custom_jvp

@@ -19,9 +19,6 @@ from attjax.dynamics.equations import EquationsOfMotion, RigidState, add
 from attjax.dynamics.fused_loop import one_kernel, one_loop
 from attjax.spacecraft import INTEGRATION_STEP
 
-STEPS_TOGETHER = 7
-"""RK4 steps in one loop over a batch, or in one kernel: three of them are the paper's 21."""
-
 GROUPS_IN_LINE = 3
 """Most of those groups that are compiled one after another before there is a loop over them."""
 
@@ -41,10 +38,10 @@ class AgentStep(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """Which of the later RK4 steps comes next, and how many of them are taken; as floats."""
+    """Which of the later RK4 steps comes next, and how many are taken, None: all; as floats."""
 
     number: Float[Array, ""]
-    limit: Float[Array, ""]
+    limit: Float[Array, ""] | None
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
@@ -59,7 +56,7 @@ def change(
     Args:
         agent_step: what is known of it.
         start: the state; of any type whose rate the equations give.
-        equations: of motion; of any type that has their methods.
+        equations: of motion; of any type that has the methods of :class:`EquationsOfMotion`.
         limit: how many of the later RK4 steps are taken; None: all.
     """
     return jax.lax.platform_dependent(
@@ -89,7 +86,8 @@ def change_in_groups(call: Callable, agent_step: AgentStep, *parts: Any) -> Rigi
         call: :func:`one_loop` or :func:`one_kernel`.
         agent_step, parts: as of :func:`change`.
     """
-    return _change_with(call, (STEPS_TOGETHER, GROUPS_IN_LINE), agent_step, *parts)
+    _, equations, _ = parts
+    return _change_with(call, (equations.steps_together, GROUPS_IN_LINE), agent_step, *parts)
 
 
 def _change_with(call, groups_of, agent_step, start, equations, limit):
@@ -102,9 +100,10 @@ def _change_with(call, groups_of, agent_step, start, equations, limit):
     """
     together, in_line = groups_of
     later_equations = equations if agent_step.held else equations.coasting()
+    is_counted = limit is not None or equations.is_timed
 
     def later(count, number, change):
-        turn = None if limit is None else Turn(number, limit)
+        turn = Turn(number, limit) if is_counted else None
         return call(functools.partial(_more_steps, count), turn, start, change, later_equations)
 
     with_first = min(together - 1, agent_step.frameskip)
@@ -126,8 +125,11 @@ def _type(state):
 
 
 def _first_steps(held, with_first, limit, start, equations):
-    change = rk4_increment(equations, start, INTEGRATION_STEP)
-    turn = None if limit is None else Turn(number=jnp.zeros_like(limit), limit=limit)
+    first = np.zeros((), _type(start))
+    change = rk4_increment(equations.during(first, start), start, INTEGRATION_STEP)
+    change = equations.after(first, change)
+    is_counted = limit is not None or equations.is_timed
+    turn = Turn(first, limit) if is_counted else None
     later_equations = equations if held else equations.coasting()
     return _more_steps(with_first, turn, start, change, later_equations)
 
@@ -143,8 +145,10 @@ def _more_steps(count, turn, start, change, equations):
 @jax.jit
 def _later_step(turn, start, change, equations):
     """One of them; jitted so that it is traced once for all."""
-    later = add(change, rk4_increment(equations, add(start, change), INTEGRATION_STEP))
-    if turn is None:
+    number, state = None if turn is None else turn.number + 1, add(start, change)
+    increment = rk4_increment(equations.during(number, state), state, INTEGRATION_STEP)
+    later = equations.after(number, add(change, increment))
+    if turn is None or turn.limit is None:
         return later
     is_taken = turn.number < turn.limit
     return jax.tree.map(functools.partial(jnp.where, is_taken), later, change)

@@ -22,6 +22,16 @@ ARCTANGENT = (
 """Coefficients of arctan(√t)/√t over t from 0 to 1, interpolated at Chebyshev's nodes: 3e-9."""
 
 
+def unit(vector: Float[Array | np.ndarray, "n"]) -> Float[Array, "n"]:
+    """Scale a vector (n,) to unit length.
+
+    Example:
+        >>> unit(jnp.array([3.0, 4.0])).tolist()
+        [0.6..., 0.8...]
+    """
+    return jnp.divide(vector, jnp.sqrt(squared_norm(vector)))
+
+
 def square_root(x: Float[Array | np.ndarray, "*shape"]) -> Float[Array, "*shape"]:
     """√x, element by element, with the gradient 0 where x is 0; that of the plain root is infinite.
 

@@ -12,7 +12,7 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Float, Real
 
 from attjax import checks
-from attjax.dynamics.numerics import polar_angle, square_root, squared_norm
+from attjax.dynamics.numerics import polar_angle, square_root, squared_norm, unit
 
 
 def from_axis_angle(
@@ -37,7 +37,27 @@ def from_axis_angle(
 
 def normalize(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, "4"]:
     """Scale a (4,) quaternion to unit length."""
-    return jnp.divide(quaternion, jnp.sqrt(squared_norm(quaternion)))
+    return unit(quaternion)
+
+
+def rotation_matrix(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, "3 3"]:
+    """The matrix that turns a vector about the axis by the angle of a (4,) unit quaternion.
+
+    Its transpose leads from the target's components of a vector to the body's.
+
+    Example:
+        >>> quarter = from_axis_angle(jnp.array([0.0, 0.0, 1.0]), jnp.pi / 2)
+        >>> [round(x.item()) for x in rotation_matrix(quarter) @ jnp.array([1.0, 0.0, 0.0])]
+        [0, 1, 0]
+    """
+    q1, q2, q3, qs = checks.real("quaternion", quaternion, (4,))
+    return jnp.stack(
+        [
+            jnp.stack([1 - 2 * (q2**2 + q3**2), 2 * (q1 * q2 - qs * q3), 2 * (q1 * q3 + qs * q2)]),
+            jnp.stack([2 * (q1 * q2 + qs * q3), 1 - 2 * (q1**2 + q3**2), 2 * (q2 * q3 - qs * q1)]),
+            jnp.stack([2 * (q1 * q3 - qs * q2), 2 * (q2 * q3 + qs * q1), 1 - 2 * (q1**2 + q2**2)]),
+        ]
+    )
 
 
 def derivative(

@@ -11,15 +11,16 @@ from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
 from attjax.dynamics.fused_loop import apart
 from attjax.dynamics.numerics import squared_norm
-from attjax.envs import initial_state, simulator, spaces
+from attjax.envs import initial_state, parameters, simulator, spaces, torques, worlds
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
-from attjax.envs.keys import observation_key, steps_key
+from attjax.envs.keys import observation_key, steps_key, world_key
+from attjax.envs.parameters import EnvParams, EnvState
 from attjax.envs.restart import restart_one
 from attjax.envs.reward import Transition, paper_reward
-from attjax.envs.simulator import EnvParams, EnvState
 from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
 from attjax.values import ACTIONS, check_choice, check_share, check_truth, integer
+from attjax.world import IDEAL, World
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,6 +39,7 @@ class AttitudeEnv:
             works it out, and shows zeros.
         actions: "discrete", rows of the torque table; or "continuous", (3,) torques about the
             body axes at once, in fractions from −1 to 1 of the table's largest, clipped there.
+        world: that it flies in: what it is not as believed, and what else acts.
 
     Raises:
         ValueError: frameskip is no integer from 0 on, an agent step exceeds the episode, another
@@ -58,6 +60,7 @@ class AttitudeEnv:
     kinematic_factor: float = 0.5
     observes_quaternion_rate: bool = True
     actions: str = "discrete"
+    world: World = IDEAL
 
     def __post_init__(self):
         most = self.spacecraft.most_frameskip
@@ -71,7 +74,7 @@ class AttitudeEnv:
         check_truth("observes_quaternion_rate", self.observes_quaternion_rate)
         check_choice("actions", self.actions, ACTIONS)
         if self._is_continuous:
-            simulator.largest_torques(np.array(self.spacecraft.torque_table))  # checks the axes
+            torques.largest_torques(np.array(self.spacecraft.torque_table))  # checks the axes
 
     name = "AttitudeEnv"
 
@@ -98,19 +101,14 @@ class AttitudeEnv:
     @property
     def default_params(self) -> EnvParams:
         """The spacecraft and its task at this frameskip."""
-        return simulator.default_params(self.frameskip, self.spacecraft)
+        return parameters.default_params(self.frameskip, self.spacecraft)
 
     def context(self, params: EnvParams) -> Context:
         """What a controller may know of this environment."""
-        period = self._period(params)
+        period = parameters.control_period(params, self.frameskip)
         duration = period if params.torque_held else INTEGRATION_STEP
         spacecraft = params.inertia, params.torque_table, params.rate_limit
         return Context(period, *spacecraft, duration, self.kinematic_factor, self._is_continuous)
-
-    def _period(self, params):
-        frameskip = self.frameskip if params.frameskip is None else params.frameskip
-        rk4_steps = jnp.asarray(1 + frameskip, jnp.asarray(params.inertia).dtype)
-        return rk4_steps * INTEGRATION_STEP
 
     def reset(
         self, key: chex.PRNGKey, params: EnvParams | None = None
@@ -121,10 +119,14 @@ class AttitudeEnv:
             ValueError: a parameter is not as :class:`attjax.EnvParams` says.
         """
         params = self.default_params if params is None else params
-        simulator.check_params(params, self.frameskip)
+        parameters.check_params(params, self.frameskip)
         start = self.initial_state(key, params)
         drawn_once = {x: apart(getattr(start, x)) for x in ("quaternion", "angular_velocity")}
         state = start.replace(**drawn_once)
+        if not self.world.is_ideal:
+            axes = torques.torque_axes(params, self.spacecraft, self.actions)
+            plant = worlds.drawn_plant(self.world, world_key(key), params, axes, self.frameskip)
+            state = state.replace(plant=plant)
         return self.observe(observation_key(key), state, params), state
 
     reset_env = reset
@@ -175,7 +177,7 @@ class AttitudeEnv:
         """
         rules = self.frameskip, self.kinematic_factor, self.actions
         next_state = simulator.step(state, action, params, *rules)
-        torque = simulator.applied_torque(action, params)
+        torque = torques.acting_torque(state, action, params, self.frameskip)
         rate = jnp.sqrt(squared_norm(next_state.angular_velocity))
         terminated = rate > params.rate_limit
         truncated = ~terminated & (next_state.time >= params.max_steps_in_episode)
@@ -186,7 +188,7 @@ class AttitudeEnv:
             terminated=terminated,
             truncated=truncated,
             goal_angle=params.goal_angle,
-            control_period=self._period(params),
+            control_period=parameters.control_period(params, self.frameskip),
             impulse=torque * self.context(params).torque_duration,
         )
         angle = quaternions.error_angle(next_state.quaternion)
@@ -232,7 +234,7 @@ class AttitudeEnv:
         context = self.context(params)
         torque = context.largest_torque
         if self._is_continuous:
-            torque = jnp.linalg.norm(simulator.largest_torques(context.torque_table))
+            torque = jnp.linalg.norm(torques.largest_torques(context.torque_table))
         kick = torque * context.torque_duration / jnp.min(moments)
         rate = (params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))
         one = jnp.ones_like(rate)

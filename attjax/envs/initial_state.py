@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from attjax.dynamics import quaternion as quaternions
-from attjax.envs.simulator import EnvParams, EnvState
+from attjax.envs.parameters import EnvParams, EnvState
 
 
 def initial_state(key: chex.PRNGKey, params: EnvParams) -> EnvState:
@@ -69,7 +69,7 @@ def starts_whole(state: EnvState) -> chex.Array:
         A bool for each state.
 
     Example:
-        >>> from attjax.envs.simulator import default_params
+        >>> from attjax.envs.parameters import default_params
         >>> start = initial_state(jax.random.key(0), default_params())
         >>> bool(starts_whole(start)), bool(starts_whole(start.replace(time=400)))
         (True, False)

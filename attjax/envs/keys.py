@@ -4,7 +4,7 @@ import chex
 import jax
 import numpy as np
 
-_OBSERVATION, _STEPS = np.uint32(2**32 - 1), np.uint32(2**32 - 2)
+_OBSERVATION, _STEPS, _WORLD = (np.uint32(2**32 - n) for n in (1, 2, 3))
 """What ``fold_in`` derives keys with that share nothing with the one they come from.
 
 ``uniform``, ``split`` and ``fold_in`` all encrypt numbers with the key: the first two 0, 1, 2, …,
@@ -25,3 +25,8 @@ def steps_key(key: chex.PRNGKey) -> chex.PRNGKey:
         >>> third = jax.random.fold_in(key, 2)
     """
     return jax.random.fold_in(key, _STEPS)
+
+
+def world_key(key: chex.PRNGKey) -> chex.PRNGKey:
+    """The key of an episode's world, from the key of its reset."""
+    return jax.random.fold_in(key, _WORLD)

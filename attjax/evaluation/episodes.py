@@ -16,7 +16,7 @@ from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
 from attjax.envs.keys import observation_key, steps_key
-from attjax.envs.simulator import EnvParams, EnvState
+from attjax.envs.parameters import EnvParams, EnvState
 from attjax.sharding import SHARED, SPLIT
 from attjax.values import integer
 

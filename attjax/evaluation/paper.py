@@ -4,7 +4,7 @@ import dataclasses
 
 import jax.numpy as jnp
 
-from attjax.envs.simulator import EnvState
+from attjax.envs.parameters import EnvState
 from attjax.spacecraft import LM50, Spacecraft
 
 PAPER_TABLE_2 = {

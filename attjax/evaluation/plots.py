@@ -12,7 +12,7 @@ from attjax import canvas, evaluation
 from attjax.control import time_optimal
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
-from attjax.envs.simulator import EnvParams, EnvState
+from attjax.envs.parameters import EnvParams, EnvState
 from attjax.evaluation import paper
 from attjax.evaluation.episodes import Controller, Episodes, History
 from attjax.evaluation.paper import PAPER_TABLE_2, is_the_papers

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 
 from attjax.envs.attitude import AttitudeEnv
-from attjax.envs.simulator import EnvParams
+from attjax.envs.parameters import EnvParams
 from attjax.evaluation.episodes import Controller, Episodes, fly
 from attjax.values import integer
 
@@ -56,6 +56,7 @@ def conditions(env: AttitudeEnv, params: EnvParams, seed: int, episodes: int) ->
         "control_hz": 1 / env.control_period,
         "duration_s": int(params.max_steps_in_episode) * env.control_period,
         "seed": integer(seed),
+        "world": env.world.name,
     }
 
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from attjax.envs import observation as observations
-from attjax.envs import simulator
+from attjax.envs import torques
 from attjax.export import c_text
 from attjax.export.kind import NOTHING_KEEPS, CDecision, Kind, States, decide_all
 
@@ -57,7 +57,7 @@ def _decide(flight, quaternion, angular_velocity):
     """(3,) torque, N m."""
     observation = observations.observe(quaternion, angular_velocity)
     action = flight.policy.act(flight.params, observation, flight.context)
-    return simulator.applied_torque(action, flight.env.default_params)
+    return torques.applied_torque(action, flight.env.default_params)
 
 
 def _torques(flight, quaternion, angular_velocity):
@@ -77,7 +77,7 @@ def _in_float64(flight, *state):
 
 def _largest_torques(flight):
     """(3,) float32."""
-    return np.asarray(simulator.largest_torques(flight.torque_table), np.float32)
+    return np.asarray(torques.largest_torques(flight.torque_table), np.float32)
 
 
 _C_NAMES = {

@@ -14,13 +14,14 @@ from attjax.config.run import Config
 from attjax.config.settings import Settings, Task
 from attjax.control import assurance
 from attjax.control.features import FEATURES
-from attjax.envs import initial_state, simulator
+from attjax.envs import initial_state, parameters
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.reward import REWARDS
 from attjax.errors import UserValueError
 from attjax.ppo import train_state
 from attjax.ppo.networks import Policy
 from attjax.spacecraft import LM50, Spacecraft
+from attjax.world import IDEAL, World
 
 MAX_DEVICES = 8
 """Most devices of a run, a power of two as their number is."""
@@ -62,7 +63,7 @@ def rules(task: Task) -> dict[str, Any]:
 
 
 def environment(frameskip: int, craft: Spacecraft, given: dict[str, Any]) -> AttitudeEnv:
-    """The simulator, with other fields by name.
+    """The simulator, with other fields by name: rules, and the world.
 
     Raises:
         UserValueError: actions are continuous, and a torque of the spacecraft along no body axis.
@@ -73,7 +74,9 @@ def environment(frameskip: int, craft: Spacecraft, given: dict[str, Any]) -> Att
         raise UserValueError(f"{craft}: {error}") from None
 
 
-def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) -> train_state.Setup:
+def setup(
+    settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1, world: World = IDEAL
+) -> train_state.Setup:
     """Environment, policy and settings of a training run.
 
     Raises:
@@ -87,7 +90,7 @@ def setup(settings: Settings, craft: Spacecraft = LM50, num_devices: int = 1) ->
             settings.task.near_goal_share, settings.task.near_goal_steps
         )
     frameskip = max(settings.task.frameskips)
-    given = {"reward": reward, "initial_state": start, **rules(settings.task)}
+    given = {"reward": reward, "initial_state": start, "world": world, **rules(settings.task)}
     env = environment(frameskip, craft, given)
     if settings.task.reward not in REWARDS:
         first_reward = functools.partial(_first_reward, env)
@@ -106,7 +109,8 @@ def of_config(config: Config) -> train_state.Setup:
     Raises:
         FunctionError, UserValueError: as :func:`setup`.
     """
-    return setup(config.settings, config.spacecraft, num_devices(config.settings))
+    devices = num_devices(config.settings)
+    return setup(config.settings, config.spacecraft, devices, config.world)
 
 
 def _check_that_torques_are_left(settings, craft):
@@ -148,7 +152,7 @@ def num_devices(settings: Settings) -> int:
     return max(n for n in range(1, shared + 1) if shared % n == 0 and n <= most)
 
 
-def env_params(setup: train_state.Setup) -> simulator.EnvParams:
+def env_params(setup: train_state.Setup) -> parameters.EnvParams:
     """The spacecraft's parameters, but for the cap on the episode's length.
 
     Where actions are continuous, nothing masks them, and the rate limit is the margin of it that

@@ -22,6 +22,7 @@ from attjax.config.run import Config
 from attjax.config.settings import FIELDS
 from attjax.errors import UserError, warning_line
 from attjax.runs import belongings
+from attjax.world import IDEAL, World
 
 fcntl: ModuleType | None
 try:
@@ -29,7 +30,7 @@ try:
 except ImportError:  # Windows, where runs are not kept apart
     fcntl = None
 
-FORMAT = 8
+FORMAT = 9
 CONFIG, METRICS = belongings.CONFIG, belongings.METRICS
 LOST = "lost+found"
 
@@ -154,6 +155,7 @@ def write_config(folder: Path, config: Config) -> None:
 
 def _text(config, run):
     content = {"program": "attjax", "format": FORMAT, "run": run, **dataclasses.asdict(config)}
+    content["world"] = config.world.table()
     return json.dumps(content, indent=2) + "\n"
 
 
@@ -187,9 +189,15 @@ def read_config(folder: Path) -> Config:
             int(content["seed"]),
             settings.from_json(content["settings"]),
             spacecraft.from_lists(content["spacecraft"]),
+            World.from_lists(content["world"]),
         )
     except (ValueError, KeyError, TypeError, OverflowError) as error:
         raise FolderError(f"{path} cannot be read: {error!r}") from None
+
+
+def _with_a_world(content):
+    """Format 8 had the ideal world only."""
+    return content | {"format": FORMAT, "world": IDEAL.table()}
 
 
 def _with_later_settings(content):
@@ -199,10 +207,10 @@ def _with_later_settings(content):
         given = {name: x for subject in given.values() for name, x in subject.items()}
     later = {name: f.metadata["before"] for name, f in FIELDS.items() if "before" in f.metadata}
     by_subject = dataclasses.asdict(settings.from_flat(later | given))
-    return content | {"format": FORMAT, "settings": by_subject}
+    return _with_a_world(content) | {"settings": by_subject}
 
 
-UPGRADES = dict.fromkeys((5, 6, 7), _with_later_settings)
+UPGRADES = dict.fromkeys((5, 6, 7), _with_later_settings) | {8: _with_a_world}
 """What makes the content of an earlier format one of the present format."""
 
 

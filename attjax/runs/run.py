@@ -80,7 +80,8 @@ class Run:
         """The spacecraft's task as it is judged: at 40 Hz, or the trained rate nearest to it."""
         frameskip = frameskip_to_judge(self.config.settings.task.frameskips)
         rules = build.rules(self.config.settings.task)
-        return AttitudeEnv(frameskip, spacecraft=self.config.spacecraft, **rules)
+        config = self.config
+        return AttitudeEnv(frameskip, spacecraft=config.spacecraft, world=config.world, **rules)
 
     @property
     def metrics(self) -> dict[str, np.ndarray]:

@@ -72,7 +72,8 @@ def train(
         callback: called with each block's row of metrics; where it returns True, the run ends
             there. An :class:`Observer` hears more.
         debug_nans: check every operation, and name the first that makes a NaN; slow.
-        settings: by name, in place of the preset's: any of ``train.py --help``.
+        settings: by name, in place of the preset's: any of ``train.py --help``; and ``world``, a
+            :class:`attjax.world.World` or the name of one, "ideal" by default.
 
     Returns:
         The run: ``policy``, ``metrics``, ``env``, and all else of :class:`attjax.runs.run.Run`.

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from attjax import sharding
 from attjax.envs import batch, restart
 from attjax.envs.attitude import AttitudeEnv
-from attjax.envs.simulator import EnvParams, EnvState
+from attjax.envs.parameters import EnvParams, EnvState
 
 
 @functools.partial(jax.jit, static_argnames="env")

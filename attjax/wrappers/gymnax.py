@@ -15,7 +15,7 @@ import jax
 from gymnax.environments import environment, spaces
 
 from attjax.envs.attitude import AttitudeEnv
-from attjax.envs.simulator import EnvParams, EnvState
+from attjax.envs.parameters import EnvParams, EnvState
 from attjax.envs.spaces import Discrete
 
 

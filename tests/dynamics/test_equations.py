@@ -64,6 +64,11 @@ class WheelEquations(NamedTuple):
     moments: tuple
     motor: jax.Array | None
 
+    steps_together = equations.EquationsOfMotion.steps_together
+    is_timed = False
+    during = equations.EquationsOfMotion.during
+    after = equations.EquationsOfMotion.after
+
     def coasting(self):
         return self._replace(motor=None)
 

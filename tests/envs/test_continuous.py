@@ -7,7 +7,7 @@ import pytest
 
 import attjax
 from attjax import AttitudeEnv, EnvState, Spacecraft
-from attjax.envs import simulator
+from attjax.envs import torques
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
@@ -83,7 +83,7 @@ def test_torques_of_another_spacecraft_that_are_held():
     )
     env = AttitudeEnv(23, spacecraft=spacecraft, actions="continuous")
     params = env.default_params
-    np.testing.assert_allclose(simulator.largest_torques(params.torque_table), [0, 0.004, 0.004])
+    np.testing.assert_allclose(torques.largest_torques(params.torque_table), [0, 0.004, 0.004])
     after = env.step_env(KEY, REST, jnp.array([1.0, 0.5, -1.0]), params)[1]
     expected = np.array([0, 0.002, -0.004]) * 0.1 / 2
     np.testing.assert_allclose(after.angular_velocity, expected, rtol=1e-5, atol=1e-12)

@@ -6,14 +6,14 @@ import pytest
 import attjax
 from attjax import AttitudeEnv
 from attjax.dynamics import quaternion as quaternions
-from attjax.envs import initial_state, simulator
+from attjax.envs import initial_state, parameters
 from attjax.spacecraft import LM50
 
 pytestmark = pytest.mark.usefixtures("strict_promotion")
 
 
 def states(n, seed=0):
-    params = simulator.default_params()
+    params = parameters.default_params()
     keys = jax.random.split(jax.random.key(seed), n)
     return jax.vmap(initial_state.initial_state, (0, None))(keys, params)
 
@@ -54,7 +54,7 @@ def test_initial_slews_are_uniform_in_angle_and_axis():
 
 def test_near_goal_starts_cover_every_decade_of_angle_and_rate():
     n = 100_000
-    params = simulator.default_params()
+    params = parameters.default_params()
     starts = initial_state.NearGoalStarts(share=0.75, steps=64)
     drawn = jax.vmap(starts, (0, None))(jax.random.split(jax.random.key(0), n), params)
     near = np.asarray(drawn.time) == 500 - 64
@@ -73,7 +73,7 @@ def test_near_goal_starts_cover_every_decade_of_angle_and_rate():
 
 
 def test_near_goal_starts_never_mark_a_whole_episode():
-    params = simulator.default_params().replace(max_steps_in_episode=jnp.int32(10))
+    params = parameters.default_params().replace(max_steps_in_episode=jnp.int32(10))
     starts = initial_state.NearGoalStarts(share=0.999, steps=64)
     times = jax.vmap(starts, (0, None))(jax.random.split(jax.random.key(0), 50), params).time
     assert set(times.tolist()) == {1}
@@ -81,7 +81,7 @@ def test_near_goal_starts_never_mark_a_whole_episode():
 
 @pytest.mark.parametrize("frameskip, steps", [(20, 500), (5, 1750), (7, 1312), (0, 10_500)])
 def test_episodes_last_43_75_seconds(frameskip, steps):
-    assert simulator.default_params(frameskip).max_steps_in_episode == steps
+    assert parameters.default_params(frameskip).max_steps_in_episode == steps
 
 
 def test_step_vmapped_equals_single_steps():
@@ -132,7 +132,7 @@ def uniforms(direction):
 def test_near_goal_starts_are_made_of_independent_uniform_numbers():
     """Each quantity is uniform after its inverse distribution function, and no two are related."""
     n = 100_000
-    params = simulator.default_params()
+    params = parameters.default_params()
     starts = initial_state.NearGoalStarts(share=0.5, steps=64)
     drawn = jax.vmap(starts, (0, None))(jax.random.split(jax.random.key(0), n), params)
     near = np.asarray(drawn.time) > 0
@@ -159,7 +159,7 @@ def test_a_share_of_none_is_none(monkeypatch):
     """Though the number that decides may be 0."""
     monkeypatch.setattr(jax.random, "uniform", lambda key, shape, dtype: jnp.zeros(shape, dtype))
     none = initial_state.NearGoalStarts(share=0.0, steps=64)
-    start = none(jax.random.key(0), simulator.default_params())
+    start = none(jax.random.key(0), parameters.default_params())
     assert not start.angular_velocity.any() and start.time == 0
     assert hash(none) == hash(
         initial_state.NearGoalStarts(share=0.0, steps=64)
@@ -180,7 +180,7 @@ def test_an_environment_says_which_episodes_are_whole():
 
 def test_parameters_may_be_arguments_of_a_jitted_step():
     """All but torque_held are traced; what is left out of them is the paper's."""
-    whole = simulator.default_params(20)
+    whole = parameters.default_params(20)
     names = [f for f in whole.__dataclass_fields__ if f not in ("frameskip", "torque_held")]
     params = attjax.EnvParams(**{name: getattr(whole, name) for name in names})
     assert params.frameskip is None and params.torque_held is False
@@ -190,7 +190,7 @@ def test_parameters_may_be_arguments_of_a_jitted_step():
     kick = 0.5 / 240 / 0.872
     assert float(after.angular_velocity[0]) == pytest.approx(kick, rel=1e-5)
     assert float(held.angular_velocity[0]) == pytest.approx(21 * kick, rel=1e-4)
-    default = simulator.default_params()
+    default = parameters.default_params()
     jax.tree.map(np.testing.assert_array_equal, default, whole)
 
 
@@ -214,17 +214,17 @@ def test_parameters_may_be_arguments_of_a_jitted_step():
     ],
 )
 def test_parameters_at_the_edge_pass_and_beyond_it_are_refused(name, allowed, refused, wrong):
-    params = simulator.default_params()
-    simulator.check_params(params.replace(**{name: allowed}), 20)
+    params = parameters.default_params()
+    parameters.check_params(params.replace(**{name: allowed}), 20)
     with pytest.raises(ValueError) as error:
-        simulator.check_params(params.replace(**{name: refused}), 20)
+        parameters.check_params(params.replace(**{name: refused}), 20)
     assert wrong in str(error.value)
 
 
 def test_a_step_outside_jit_compiles_once(caplog):
     """And not again for other states, actions and parameters."""
     starts = [jax.tree.map(lambda x, row=row: x[row], states(3)) for row in range(3)]
-    params = simulator.default_params(31)
+    params = parameters.default_params(31)
     heavier = params.replace(inertia=params.inertia * 2)
 
     def compiled():

@@ -9,7 +9,7 @@ from attjax import AttitudeEnv, evaluation
 from attjax.control import classical, time_optimal
 from attjax.control.classical import average_torque
 from attjax.dynamics import quaternion as quaternions
-from attjax.envs.simulator import EnvState
+from attjax.envs.parameters import EnvState
 from attjax.evaluation import paper, plots
 from attjax.runs import learning_curve
 

@@ -13,7 +13,7 @@ from exported import needs_compiler
 from exported_continuous import c_torques, feedback, flying, untrained
 
 from attjax import AttitudeEnv
-from attjax.envs.simulator import EnvState
+from attjax.envs.parameters import EnvState
 from attjax.export import c as export_c
 from attjax.export import flight_check, flight_policy
 from attjax.export.flight_policy import FlightPolicy

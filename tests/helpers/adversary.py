@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from attjax import EnvState, Spacecraft, dynamics
 from attjax.control import assurance
 from attjax.dynamics import rigid_body
-from attjax.envs import simulator
+from attjax.envs import parameters, simulator
 from attjax.envs.attitude import AttitudeEnv
 
 MARGIN = 0.99
@@ -80,7 +80,7 @@ def batch(kind: str, form: str, count: int, steps: int, seed: int):
     frameskips = rng.integers(least, most, count, endpoint=True)
     crafts = [random_spacecraft(rng, kind, form, frameskip, steps) for frameskip in frameskips]
     params = [
-        simulator.default_params(0, craft).replace(frameskip=jnp.array(frameskip, jnp.int32))
+        parameters.default_params(0, craft).replace(frameskip=jnp.array(frameskip, jnp.int32))
         for craft, frameskip in zip(crafts, frameskips)
     ]
     return AttitudeEnv(most, spacecraft=crafts[0]), jax.tree.map(lambda *x: jnp.stack(x), *params)

@@ -12,8 +12,8 @@ GROUND = (  # single files, each importing only earlier ones
     "canvas", "checks", "jax_setup", "devices", "sharding",
 )  # fmt: skip
 FOLDERS = (
-    "config", "dynamics", "envs", "control", "wrappers", "ppo", "evaluation", "runs", "export",
-    "commands",
+    "world", "config", "dynamics", "envs", "control", "wrappers", "ppo", "evaluation", "runs",
+    "export", "commands",
 )  # fmt: skip
 ALIASES = ("gymnasium_env", "gymnasium_vector", "gymnax_compat", "sb3")
 ORDER = (*GROUND, *FOLDERS, *ALIASES, "__main__", "__init__")

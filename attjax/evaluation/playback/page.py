@@ -12,7 +12,7 @@ import attjax
 from attjax import evaluation, resources
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
-from attjax.envs.simulator import EnvParams, EnvState
+from attjax.envs.parameters import EnvParams, EnvState
 from attjax.evaluation import paper
 from attjax.evaluation.episodes import Controller
 from attjax.values import integer

@@ -10,8 +10,8 @@ import numpy as np
 from attjax import checks
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.keys import steps_key
+from attjax.envs.parameters import EnvParams
 from attjax.envs.reward import Transition
-from attjax.envs.simulator import EnvParams
 from attjax.values import integer
 from attjax.wrappers import compiled
 from attjax.wrappers.gymnasium.task import (

@@ -24,8 +24,8 @@ from jax._src.xla_bridge import backends_are_initialized
 
 from attjax.control import assurance
 from attjax.envs.attitude import AttitudeEnv
+from attjax.envs.parameters import EnvParams, EnvState
 from attjax.envs.reward import REWARDS, Transition
-from attjax.envs.simulator import EnvParams, EnvState
 from attjax.envs.spaces import Discrete
 
 if TYPE_CHECKING:

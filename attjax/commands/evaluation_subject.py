@@ -1,0 +1,92 @@
+"""What ``eval.py`` is to judge: the run of the policy, the spacecraft, its world, the simulator."""
+
+import argparse
+import dataclasses
+from collections.abc import Collection
+from typing import TYPE_CHECKING
+
+from attjax import errors
+from attjax.config import run as run_config
+from attjax.config import toml
+from attjax.runs import folder as run_folder
+from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
+from attjax.world import IDEAL
+
+if TYPE_CHECKING:
+    from attjax.envs.attitude import AttitudeEnv
+
+POLICY = "policy"
+
+
+def config(arguments: argparse.Namespace, names: Collection[str]) -> run_config.Config | None:
+    """The policy's run; None where there is no policy.
+
+    Args:
+        arguments: of the command line.
+        names: of the controllers.
+
+    Raises:
+        UserError: the checkpoint cannot be read, or a flag does not go with what is judged.
+    """
+    if arguments.frameskip is not None:
+        _check_duration(arguments.duration, arguments.frameskip)
+    run = run_folder.read_config(arguments.checkpoint) if POLICY in names else None
+    if arguments.sampled and run is None:
+        raise errors.UserError(f"--sampled is for a policy; {next(iter(names))} draws nothing")
+    if run and arguments.actions not in (None, run.settings.task.actions):
+        raise errors.UserError(
+            f"--actions is {arguments.actions}; the policy in {arguments.checkpoint} was trained "
+            f"with {run.settings.task.actions} ones, and what is judged beside it has the same"
+        )
+    return run
+
+
+def spacecraft(arguments: argparse.Namespace, config: run_config.Config | None) -> Spacecraft:
+    """What flies, with the duration that was asked for.
+
+    Raises:
+        UserError: its file cannot be read or describes none, or the duration is too short.
+    """
+    if arguments.spacecraft is not None:
+        craft = toml.read_spacecraft(arguments.spacecraft)
+    else:
+        craft = config.spacecraft if config else LM50
+    if arguments.duration is not None:
+        try:
+            craft = dataclasses.replace(craft, duration=arguments.duration)
+        except ValueError as error:
+            raise errors.UserError(f"--duration {arguments.duration:g}: {error}") from None
+    _check_duration(craft.duration, arguments.frameskip)
+    return craft
+
+
+def _check_duration(duration, frameskip):
+    period = (frameskip + 1) * INTEGRATION_STEP
+    if duration is not None and duration < period * (1 - 1e-6):
+        raise errors.UserError(
+            f"--duration is {duration} s; it must hold at least one agent step of {period:.4g} s"
+        )
+
+
+def env(
+    arguments: argparse.Namespace, config: run_config.Config | None, spacecraft: Spacecraft
+) -> "AttitudeEnv":
+    """The simulator that all controllers fly, by the rules of the policy's training.
+
+    It flies in the world that was asked for, or in that of the training.
+
+    Raises:
+        UserError: there is no such world, or the spacecraft cannot fly in it.
+    """
+    # Imported late: with it, --help and errors in the arguments would take seconds.
+    from attjax.runs import build
+
+    world = config.world if config else IDEAL
+    if arguments.world is not None:
+        world = toml.read_world(arguments.world)
+    with errors.one_line_errors(ValueError):
+        run_config.check_world(world, spacecraft)
+    rules = {"actions": arguments.actions or "discrete"}
+    if config:
+        rules = build.rules(config.settings.task)
+    return build.environment(arguments.frameskip, spacecraft, {"world": world, **rules})

@@ -1,0 +1,139 @@
+"""The equations of motion in a world that is not perfect: late pulses, disturbances.
+
+They have the methods of :class:`attjax.dynamics.equations.EquationsOfMotion`, so that the same
+loop integrates them. What a world lacks is None here, and nothing of it is compiled.
+"""
+
+import dataclasses
+import functools
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from attjax.dynamics import vectors
+from attjax.dynamics.disturbances import Acting, OwnDisturbance
+from attjax.dynamics.equations import Kinematics, PrincipalTerms, TensorTerms
+from attjax.dynamics.vectors import Matrix, Vector
+
+
+class ForcedState(NamedTuple):
+    """What changes with time; also its change, and its rate of change.
+
+    Attributes:
+        quaternion, angular_velocity: as of :class:`attjax.dynamics.equations.RigidState`.
+        phasor: cosine and sine of a swinging torque's phase; None where none swings.
+    """
+
+    quaternion: tuple
+    angular_velocity: Vector
+    phasor: tuple[Any, Any] | None
+
+
+class Pulse(NamedTuple):
+    """A commanded torque on its way, or there.
+
+    Attributes:
+        start: the RK4 step, counted from the beginning of this agent step, in which it begins.
+        torque: body frame, N m.
+    """
+
+    start: Any
+    torque: Vector
+
+
+def torque_during(pulses: tuple[Pulse, ...], held: bool, number: Any) -> Vector:
+    """The torque in one RK4 step, N m, body frame.
+
+    Args:
+        pulses: in the order in which they were commanded; if they are held, the first has begun.
+        held: whether a pulse lasts until a later one begins, or for one RK4 step.
+        number: of the RK4 step.
+
+    Example:
+        >>> late = Pulse(2.0, (1.0, 0.0, 0.0))
+        >>> [float(torque_during((late,), False, n)[0]) for n in (1.0, 2.0, 3.0)]
+        [0.0, 1.0, 0.0]
+    """
+    if held:
+        first, *others = pulses
+        return functools.reduce(
+            lambda before, pulse: _chosen(pulse.start <= number, pulse.torque, before),
+            others,
+            first.torque,
+        )
+    zeros = tuple(jnp.zeros_like(x) for x in pulses[0].torque)
+    acting = [_chosen(pulse.start == number, pulse.torque, zeros) for pulse in pulses]
+    return functools.reduce(vectors.add, acting)
+
+
+def _chosen(condition, a, b):
+    return tuple(jnp.where(condition, x, y) for x, y in zip(a, b))
+
+
+@jax.tree_util.register_static
+@dataclasses.dataclass(frozen=True)
+class Held:
+    """Whether torques are held; known when it is compiled, and no number of a tree."""
+
+    value: bool
+
+
+class ForcedEquations(NamedTuple):
+    """Eq. 6 with all torques, and Eq. 9.
+
+    Attributes:
+        pulses: commanded torques.
+        held: whether these are held.
+        gyroscopic: the terms of −I⁻¹ (ω × Iω).
+        inverse: I⁻¹, rows or diagonal, 1/(kg m²).
+        acting: what else acts during the agent step.
+        swinging: a torque's amplitude, body frame, N m, and angular rate, rad/s.
+        own: disturbances of a user's own.
+        kinematics: of the attitude.
+        torque: of the pulses in this RK4 step, N m; None before :meth:`during`.
+    """
+
+    pulses: tuple[Pulse, ...]
+    held: Held
+    gyroscopic: PrincipalTerms | TensorTerms
+    inverse: Matrix | Vector
+    acting: Acting
+    swinging: tuple[Vector, Any] | None
+    own: tuple[OwnDisturbance, ...]
+    kinematics: Kinematics
+    torque: Vector | None = None
+
+    steps_together = 3
+    is_timed = True
+    """As of :class:`attjax.dynamics.equations.EquationsOfMotion`; more would not fit registers."""
+
+    def during(self, number: Any, state: ForcedState) -> "ForcedEquations":
+        """The equations of that RK4 step, counted from 0: its pulses' torque is on."""
+        del state
+        return self._replace(torque=torque_during(self.pulses, self.held.value, number))
+
+    def after(self, number: Any, change: ForcedState) -> ForcedState:
+        """What is kept of the change from the agent step's start to that RK4 step's end: all."""
+        del number
+        return change
+
+    def coasting(self) -> "ForcedEquations":
+        """The same: each pulse says itself when it is on."""
+        return self
+
+    def rate(self, state: ForcedState) -> ForcedState:
+        """Rate of change of the state."""
+        torques, phasor_rate = [self.torque, self.acting.torque(state.quaternion)], None
+        torques += [x.torque(state.quaternion, state.angular_velocity) for x in self.own]
+        if self.swinging is not None:
+            (cosine, sine), (amplitude, rate) = state.phasor, self.swinging
+            torques.append(vectors.scaled(sine, amplitude))
+            phasor_rate = -rate * sine, rate * cosine
+        torque = functools.reduce(vectors.add, [x for x in torques if x is not None])
+        acceleration = vectors.add(
+            self.gyroscopic.acceleration(state.angular_velocity),
+            vectors.times(self.inverse, torque),
+        )
+        rates = self.kinematics.rate(state.quaternion, state.angular_velocity)
+        return ForcedState(rates, acceleration, phasor_rate)

@@ -1,0 +1,100 @@
+"""One spacecraft: its state, its parameters and what they may be (Table 1, section 2.3)."""
+
+import chex
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+
+from attjax import checks
+from attjax.envs.plant import Plant
+from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
+from attjax.values import check_truth
+
+
+class EnvState(struct.PyTreeNode):
+    """State of one spacecraft.
+
+    Attributes:
+        quaternion: (4,) error quaternion, scalar last.
+        angular_velocity: (3,) body frame, rad/s.
+        time: agent steps since the start of the episode, int32.
+        plant: what flies in a world that is not perfect; None in the paper's.
+    """
+
+    quaternion: chex.Array
+    angular_velocity: chex.Array
+    time: chex.Array
+    plant: Plant | None = None
+
+
+class EnvParams(struct.PyTreeNode):
+    """Parameters of the spacecraft and its task; all numbers can be traced and vmapped.
+
+    Attributes:
+        inertia: (3,) principal moments or (3, 3) symmetric tensor, kg m².
+        torque_table: (actions, 3) torque of each action, N m.
+        rate_limit: ‖ω‖ that ends the episode when exceeded, rad/s.
+        goal_angle: largest φ that counts as pointing, rad.
+        min_slew_angle, max_slew_angle: range of the initial φ, rad.
+        max_steps_in_episode: time limit, agent steps, int32.
+        frameskip: RK4 steps after the first in an agent step, int32, where spacecraft of one batch
+            differ; at most the environment's. None: the environment's.
+        torque_held: whether a torque lasts through the agent step, or only its first RK4 step; a
+            Python bool, the same for all of a batch.
+    """
+
+    inertia: chex.Array
+    torque_table: chex.Array
+    rate_limit: chex.Array
+    goal_angle: chex.Array
+    min_slew_angle: chex.Array
+    max_slew_angle: chex.Array
+    max_steps_in_episode: chex.Array
+    frameskip: chex.Array | None = None
+    torque_held: bool = struct.field(pytree_node=False, default=False)
+
+
+def default_params(frameskip: int = 20, spacecraft: Spacecraft = LM50) -> EnvParams:
+    """A spacecraft and its task, by default the paper's, in JAX's default floating-point type."""
+    low, high = np.deg2rad(spacecraft.slew_angles_deg)
+    return EnvParams(
+        inertia=jnp.array(spacecraft.inertia, float),
+        torque_table=jnp.array(spacecraft.torque_table, float),
+        rate_limit=jnp.array(spacecraft.rate_limit, float),
+        goal_angle=jnp.array(np.deg2rad(spacecraft.goal_angle_deg), float),
+        min_slew_angle=jnp.array(low, float),
+        max_slew_angle=jnp.array(high, float),
+        max_steps_in_episode=jnp.array(spacecraft.max_steps(frameskip), jnp.int32),
+        torque_held=spacecraft.torque_held,
+    )
+
+
+def control_period(params: EnvParams, frameskip: int) -> chex.Array:
+    """Time between two actions, s, at this frameskip or the parameters' own.
+
+    Example:
+        >>> round(control_period(default_params(), 20).item(), 6)
+        0.0875
+    """
+    frameskip = frameskip if params.frameskip is None else params.frameskip
+    rk4_steps = jnp.asarray(1 + frameskip, jnp.asarray(params.inertia).dtype)
+    return rk4_steps * INTEGRATION_STEP
+
+
+def check_params(params: EnvParams, frameskip: int) -> None:
+    """Check parameters of one spacecraft, as far as they have values.
+
+    Raises:
+        ValueError: one is not what :class:`EnvParams` says.
+    """
+    checks.inertia(params.inertia)
+    checks.real("torque_table", params.torque_table, (None, 3))
+    checks.real("rate_limit", params.rate_limit, (), above=0)
+    checks.real("goal_angle", params.goal_angle, (), above=0)
+    low = checks.real("min_slew_angle", params.min_slew_angle, (), low=0)
+    low = np.asarray(low) if checks.has_value(low) else None
+    checks.real("max_slew_angle", params.max_slew_angle, (), low=low)
+    checks.integer("max_steps_in_episode", params.max_steps_in_episode, 1, 2**31 - 1)
+    if params.frameskip is not None:
+        checks.integer("params.frameskip", params.frameskip, 0, frameskip)
+    check_truth("params.torque_held", params.torque_held)

@@ -1,0 +1,110 @@
+"""What really flies in a world that is not perfect: drawn for an episode, and moved on.
+
+A controller, and all that judges it, believes in :class:`attjax.EnvParams`; what moves is this.
+"""
+
+from typing import Any
+
+import chex
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+from attjax.dynamics import integration, rigid_body
+from attjax.dynamics import quaternion as quaternions
+from attjax.dynamics.actuators import Actuators, Queue
+from attjax.dynamics.disturbances import Disturbances, Orbit
+from attjax.dynamics.draws import Draws
+from attjax.dynamics.equations import Kinematics, PrincipalTerms, TensorTerms, add
+from attjax.dynamics.forced_motion import ForcedEquations, ForcedState, Held
+from attjax.dynamics.fused_loop import apart, together
+from attjax.dynamics.integration import AgentStep
+from attjax.spacecraft import INTEGRATION_STEP
+
+
+class Plant(struct.PyTreeNode):
+    """One spacecraft in its world, in one episode.
+
+    Attributes:
+        key: of what is random in each step, as data of a JAX key.
+        inertia: (3,) principal moments or (3, 3) tensor, kg m².
+        actuators: what becomes of commands; None: just what they say.
+        queue: of pulses on their way.
+        orbit: None in a world without one.
+        disturbances: what else acts.
+        own: disturbances of a user's own.
+    """
+
+    key: chex.Array
+    inertia: chex.Array
+    actuators: Actuators | None
+    queue: Queue
+    orbit: Orbit | None
+    disturbances: Disturbances
+    own: tuple[Any, ...]
+
+    def moved(
+        self,
+        agent_step: AgentStep,
+        quaternion: chex.Array,
+        angular_velocity: chex.Array,
+        time: chex.Array,
+        steps_after: chex.Numeric | None,
+    ) -> tuple[chex.Array, chex.Array, "Plant"]:
+        """Quaternion, angular velocity, rad/s, and the plant, an agent step later.
+
+        Args:
+            agent_step: what is known of it when it is compiled.
+            quaternion, angular_velocity: before it, (4,) and (3,).
+            time: agent steps since the start of the episode.
+            steps_after: RK4 steps after the first; None: the agent step's frameskip.
+        """
+        dtype = angular_velocity.dtype
+        limit = None if steps_after is None else jnp.asarray(steps_after, dtype)
+        rk4_steps = 1 + (agent_step.frameskip if limit is None else limit)
+        period = jnp.asarray(rk4_steps, dtype) * INTEGRATION_STEP
+        phasor = self._phasor(time * period)
+        start = ForcedState(tuple(quaternion), tuple(angular_velocity), phasor)
+        equations = self._equations(agent_step, (time + 0.5) * period)
+        end = add(start, integration.change(agent_step, start, equations, limit))
+        unit = quaternions.normalize(jnp.stack(end.quaternion))
+        plant = self.replace(queue=self.queue.later(rk4_steps))
+        return unit, jnp.stack(end.angular_velocity), plant
+
+    def _phasor(self, time):
+        if self.disturbances.swinging is None:
+            return None
+        _, rate, start = self.disturbances.swinging
+        return jnp.cos(start + rate * time), jnp.sin(start + rate * time)
+
+    def _equations(self, agent_step, middle):
+        gyroscopic: PrincipalTerms | TensorTerms
+        if self.inertia.ndim == 1:
+            gyroscopic, inverse = PrincipalTerms.of(self.inertia), tuple(1 / self.inertia)
+        else:
+            rows = rigid_body.inverse(self.inertia)
+            gyroscopic, inverse = TensorTerms.of(self.inertia, rows), tuple(map(tuple, rows))
+        swinging = self.disturbances.swinging
+        return ForcedEquations(
+            pulses=self.queue.pulses(),
+            held=Held(agent_step.held),
+            gyroscopic=gyroscopic,
+            inverse=inverse,
+            acting=together(Disturbances.during, self.disturbances, self.orbit, middle),
+            swinging=None if swinging is None else swinging[:2],
+            own=self.own,
+            kinematics=Kinematics(agent_step.kinematic_factor),
+        )
+
+    def commanded(self, torque: chex.Array, time: chex.Array) -> "Plant":
+        """The plant with one more pulse on its way.
+
+        Args:
+            torque: (3,) that the actuators make of the command, N m, body frame.
+            time: agent steps since the start of the episode.
+        """
+        delay: chex.Numeric = 0
+        if self.actuators is not None:
+            key = jax.random.fold_in(jax.random.wrap_key_data(self.key), time)
+            delay = self.actuators.delay_of(Draws(key, torque.dtype))
+        return self.replace(queue=self.queue.and_then(delay, apart(torque)))
