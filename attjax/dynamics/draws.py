@@ -52,6 +52,12 @@ class Draws:
     def _unit(self, name, size):
         return numerics.unit(jax.random.normal(self._key(name), (size,), self.dtype))
 
+    def tilted(self, name: str, direction: chex.Array, angle: chex.Array) -> chex.Array:
+        """A unit vector (3,) at that angle, rad, to another, to any side alike."""
+        anywhere = self.direction(name)
+        across = numerics.unit(anywhere - jnp.sum(anywhere * direction) * direction)
+        return jnp.cos(angle) * direction + jnp.sin(angle) * across
+
     def angle(self, name: str) -> chex.Array:
         """An angle, rad, any alike."""
         return jax.random.uniform(self._key(name), (), self.dtype, 0, 2 * math.pi)

@@ -23,11 +23,14 @@ class ForcedState(NamedTuple):
     Attributes:
         quaternion, angular_velocity: as of :class:`attjax.dynamics.equations.RigidState`.
         phasor: cosine and sine of a swinging torque's phase; None where none swings.
+        seen: what sensors have sampled in the agent step: changes of quaternion and angular
+            velocity from its start; None where they sample at its end.
     """
 
     quaternion: tuple
     angular_velocity: Vector
     phasor: tuple[Any, Any] | None
+    seen: tuple[tuple | None, Vector | None] = (None, None)
 
 
 class Pulse(NamedTuple):
@@ -91,6 +94,7 @@ class ForcedEquations(NamedTuple):
         swinging: a torque's amplitude, body frame, N m, and angular rate, rad/s.
         own: disturbances of a user's own.
         kinematics: of the attitude.
+        samples: after how many RK4 steps star tracker and gyro sample; None: at the end.
         torque: of the pulses in this RK4 step, N m; None before :meth:`during`.
     """
 
@@ -102,6 +106,7 @@ class ForcedEquations(NamedTuple):
     swinging: tuple[Vector, Any] | None
     own: tuple[OwnDisturbance, ...]
     kinematics: Kinematics
+    samples: tuple[Any | None, Any | None] = (None, None)
     torque: Vector | None = None
 
     steps_together = 3
@@ -114,9 +119,13 @@ class ForcedEquations(NamedTuple):
         return self._replace(torque=torque_during(self.pulses, self.held.value, number))
 
     def after(self, number: Any, change: ForcedState) -> ForcedState:
-        """What is kept of the change from the agent step's start to that RK4 step's end: all."""
-        del number
-        return change
+        """The change from the agent step's start to that RK4 step's end, and what is seen then."""
+        moved = change.quaternion, change.angular_velocity
+        seen = [
+            None if sample is None else _chosen(number + 1 == sample, now, before)
+            for sample, now, before in zip(self.samples, moved, change.seen)
+        ]
+        return change._replace(seen=tuple(seen))
 
     def coasting(self) -> "ForcedEquations":
         """The same: each pulse says itself when it is on."""
@@ -136,4 +145,5 @@ class ForcedEquations(NamedTuple):
             vectors.times(self.inverse, torque),
         )
         rates = self.kinematics.rate(state.quaternion, state.angular_velocity)
-        return ForcedState(rates, acceleration, phasor_rate)
+        still = jax.tree.map(jnp.zeros_like, state.seen)
+        return ForcedState(rates, acceleration, phasor_rate, still)

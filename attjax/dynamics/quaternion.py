@@ -90,6 +90,26 @@ def derivative(
     )
 
 
+def turned(
+    quaternion: Float[Array | np.ndarray, "4"], turn: Float[Array | np.ndarray, "3"]
+) -> Float[Array, "4"]:
+    """The attitude (4,) after a further turn of the body, (3,), axis times angle in its frame, rad.
+
+    Example:
+        >>> start = from_axis_angle(jnp.array([0.0, 0.0, 1.0]), 0.3)
+        >>> round(rotation_vector(turned(start, jnp.array([0.0, 0.0, 0.2])))[2].item(), 6)
+        0.5
+    """
+    half = turn / 2
+    angle = square_root(squared_norm(half))
+    tiny = jnp.finfo(half.dtype).tiny
+    vector = half * jnp.where(angle > tiny, jnp.sin(angle) / jnp.maximum(angle, tiny), 1)
+    scalar = jnp.cos(angle)
+    v, qs = quaternion[:3], quaternion[3]
+    product = qs * vector + scalar * v + jnp.cross(v, vector)
+    return jnp.append(product, qs * scalar - jnp.sum(v * vector))
+
+
 def rotation_vector(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, "3"]:
     """Shortest rotation as axis times angle, (3,), rad, of a (4,) quaternion.
 

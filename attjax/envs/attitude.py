@@ -125,8 +125,8 @@ class AttitudeEnv:
         state = start.replace(**drawn_once)
         if not self.world.is_ideal:
             axes = torques.torque_axes(params, self.spacecraft, self.actions)
-            plant = worlds.drawn_plant(self.world, world_key(key), params, axes, self.frameskip)
-            state = state.replace(plant=plant)
+            drawn = params, state, axes, self.frameskip
+            state = state.replace(plant=worlds.drawn_plant(self.world, world_key(key), *drawn))
         return self.observe(observation_key(key), state, params), state
 
     reset_env = reset
@@ -207,16 +207,16 @@ class AttitudeEnv:
         return observation, next_state, self.reward(transition), terminated, info
 
     def observe(self, key: chex.PRNGKey, state: EnvState, params: EnvParams) -> chex.Array:
-        """What an agent is told of a state: the observation (11,) of Eq. 11.
+        """What an agent is told of a state: the observation (11,) of Eq. 11, as measured.
 
         Args:
-            key: for what is random in it; here nothing is.
-            state: of one spacecraft.
-            params: its parameters.
+            key: unused: what is random of it is of the state.
+            state, params: of one spacecraft.
         """
         del key, params
         rules = self.kinematic_factor, self.observes_quaternion_rate
-        return observations.observe(state.quaternion, state.angular_velocity, *rules)
+        told = parameters.measured(state)
+        return observations.observe(told.quaternion, told.angular_velocity, *rules)
 
     def starts_whole(self, state: EnvState) -> chex.Array:
         """Whether the episode that begins with this state is one of the task's: a bool a state.

@@ -6,6 +6,7 @@ import numpy as np
 from flax import struct
 
 from attjax import checks
+from attjax.dynamics.sensing import Measurement
 from attjax.envs.plant import Plant
 from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
 from attjax.values import check_truth
@@ -52,6 +53,20 @@ class EnvParams(struct.PyTreeNode):
     max_steps_in_episode: chex.Array
     frameskip: chex.Array | None = None
     torque_held: bool = struct.field(pytree_node=False, default=False)
+
+
+def measured(state: EnvState) -> Measurement:
+    """What the sensors say of a state; without any, the truth.
+
+    Example:
+        >>> state = EnvState(jnp.array([0.0, 0.0, 0.0, 1.0]), jnp.zeros(3), 0)
+        >>> measured(state).quaternion.tolist()
+        [0.0, 0.0, 0.0, 1.0]
+    """
+    if state.plant is None or state.plant.sensing is None:
+        always = jnp.asarray(True)
+        return Measurement(state.quaternion, always, state.angular_velocity, always)
+    return state.plant.sensing.told
 
 
 def default_params(frameskip: int = 20, spacecraft: Spacecraft = LM50) -> EnvParams:

@@ -19,6 +19,7 @@ from attjax.dynamics.equations import Kinematics, PrincipalTerms, TensorTerms, a
 from attjax.dynamics.forced_motion import ForcedEquations, ForcedState, Held
 from attjax.dynamics.fused_loop import apart, together
 from attjax.dynamics.integration import AgentStep
+from attjax.dynamics.sensing import Seen, Sensing
 from attjax.spacecraft import INTEGRATION_STEP
 
 
@@ -33,6 +34,7 @@ class Plant(struct.PyTreeNode):
         orbit: None in a world without one.
         disturbances: what else acts.
         own: disturbances of a user's own.
+        sensing: sensors and what they say; None: the truth is told.
     """
 
     key: chex.Array
@@ -42,6 +44,7 @@ class Plant(struct.PyTreeNode):
     orbit: Orbit | None
     disturbances: Disturbances
     own: tuple[Any, ...]
+    sensing: Sensing | None = None
 
     def moved(
         self,
@@ -63,13 +66,22 @@ class Plant(struct.PyTreeNode):
         limit = None if steps_after is None else jnp.asarray(steps_after, dtype)
         rk4_steps = 1 + (agent_step.frameskip if limit is None else limit)
         period = jnp.asarray(rk4_steps, dtype) * INTEGRATION_STEP
+        times = time * rk4_steps, (time + 1) * rk4_steps
+        samples = (None, None) if self.sensing is None else self.sensing.samples(times, dtype)
         phasor = self._phasor(time * period)
-        start = ForcedState(tuple(quaternion), tuple(angular_velocity), phasor)
-        equations = self._equations(agent_step, (time + 0.5) * period)
-        end = add(start, integration.change(agent_step, start, equations, limit))
-        unit = quaternions.normalize(jnp.stack(end.quaternion))
+        start = ForcedState(tuple(quaternion), tuple(angular_velocity), phasor, _unseen(samples))
+        equations = self._equations(agent_step, (time + 0.5) * period)._replace(samples=samples)
+        change = integration.change(agent_step, start, equations, limit)
+        end = _attained(start, change.quaternion, change.angular_velocity)
         plant = self.replace(queue=self.queue.later(rk4_steps))
-        return unit, jnp.stack(end.angular_velocity), plant
+        if self.sensing is not None:
+            seen = _attained(start, *(x or y for x, y in zip(change.seen, change[:2])))
+            plant = plant.replace(sensing=self.sensing.after(seen, end, times, self._draws(time)))
+        return *end, plant
+
+    def _draws(self, time):
+        key = jax.random.fold_in(jax.random.wrap_key_data(self.key), time)
+        return Draws(key, self.inertia.dtype)
 
     def _phasor(self, time):
         if self.disturbances.swinging is None:
@@ -105,6 +117,20 @@ class Plant(struct.PyTreeNode):
         """
         delay: chex.Numeric = 0
         if self.actuators is not None:
-            key = jax.random.fold_in(jax.random.wrap_key_data(self.key), time)
-            delay = self.actuators.delay_of(Draws(key, torque.dtype))
+            delay = self.actuators.delay_of(self._draws(time))
         return self.replace(queue=self.queue.and_then(delay, apart(torque)))
+
+
+def _unseen(samples):
+    """Zeros for what sensors sample in an agent step: a quaternion's change, and a rate's."""
+    attitude, rate = samples
+    return (
+        None if attitude is None else (jnp.zeros_like(attitude),) * 4,
+        None if rate is None else (jnp.zeros_like(rate),) * 3,
+    )
+
+
+def _attained(start, turn, acceleration):
+    """Attitude (4,) and rate (3,) after a change of the quaternion and of the rate."""
+    quaternion = quaternions.normalize(jnp.stack(add(start.quaternion, turn)))
+    return Seen(quaternion, jnp.stack(add(start.angular_velocity, acceleration)))

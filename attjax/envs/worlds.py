@@ -12,9 +12,11 @@ from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics.actuators import Actuators, empty_queue
 from attjax.dynamics.disturbances import Disturbances, EarthDipole, Orbit
 from attjax.dynamics.draws import Draws
+from attjax.dynamics.sensing import Seen
 from attjax.envs.inertia import drawn_inertia
-from attjax.envs.parameters import EnvParams
+from attjax.envs.parameters import EnvParams, EnvState, control_period
 from attjax.envs.plant import Plant
+from attjax.envs.sensors import drawn_sensing
 from attjax.world import World
 
 EARTH_RADIUS, EARTH_MU = 6.371e6, 3.986004418e14
@@ -28,7 +30,12 @@ SOLAR_PRESSURE = 4.54e-6
 
 
 def drawn_plant(
-    world: World, key: chex.PRNGKey, params: EnvParams, axes: chex.Array, frameskip: int
+    world: World,
+    key: chex.PRNGKey,
+    params: EnvParams,
+    state: EnvState,
+    axes: chex.Array,
+    frameskip: int,
 ) -> Plant:
     """The plant of an episode.
 
@@ -36,11 +43,13 @@ def drawn_plant(
         world: its description.
         key: of what is drawn.
         params: what is believed of the spacecraft.
+        state: at the episode's start.
         axes: (axes, 3) unit vectors of the torque axes, body frame, as believed.
         frameskip: RK4 steps after the first in an agent step, where all spacecraft have the same.
     """
     dtype = params.inertia.dtype
     draws = Draws(key, dtype)
+    start = Seen(state.quaternion, state.angular_velocity)
     inertia = drawn_inertia(world.uncertainty, draws, params.inertia)
     orbit = _orbit(world, draws)
     most_delay = 0 if world.actuators is None else math.ceil(world.actuators.most_delay)
@@ -53,6 +62,7 @@ def drawn_plant(
         orbit=None if orbit is None else orbit[0],
         disturbances=_disturbances(world, draws, inertia, orbit),
         own=tuple(x.drawn(draws) for x in world.own_disturbances),
+        sensing=drawn_sensing(world.sensors, draws, start, control_period(params, frameskip)),
     )
 
 
@@ -143,7 +153,9 @@ def _actuators(world, draws, axes):
     directions = jnp.asarray(axes, draws.dtype)
     if given.misalignment_deg != 0:
         angles = jnp.deg2rad(draws.number("misalignment_deg", given.misalignment_deg, (count,)))
-        turned = [_tilted(draws, n, directions[n], angles[n]) for n in range(count)]
+        turned = [
+            draws.tilted(f"misalignment_deg.{n}", directions[n], angles[n]) for n in range(count)
+        ]
         directions = jnp.stack(turned)
     faults = None
     if given.faulty_axes:
@@ -161,10 +173,3 @@ def _actuators(world, draws, axes):
         minimum_impulse=given.minimum_impulse,
         granularity=given.on_time_granularity,
     )
-
-
-def _tilted(draws, number, direction, angle):
-    """A unit vector at that angle to another, in a direction that is drawn uniformly."""
-    anywhere = draws.direction(f"misalignment_deg.{number}")
-    across = numerics.unit(anywhere - jnp.sum(anywhere * direction) * direction)
-    return jnp.cos(angle) * direction + jnp.sin(angle) * across

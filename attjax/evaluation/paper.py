@@ -6,6 +6,7 @@ import jax.numpy as jnp
 
 from attjax.envs.parameters import EnvState
 from attjax.spacecraft import LM50, Spacecraft
+from attjax.world import IDEAL
 
 PAPER_TABLE_2 = {
     ("closest", "error_deg"): (
@@ -35,6 +36,7 @@ def table_5_slews() -> EnvState:
     return EnvState(quaternion, jnp.zeros((n, 3)), jnp.zeros(n, jnp.int32))
 
 
-def is_the_papers(spacecraft: Spacecraft) -> bool:
+def is_the_papers(spacecraft: Spacecraft, world: str = IDEAL.name) -> bool:
     """Whether the paper's results can stand beside a spacecraft's; the duration may differ."""
-    return dataclasses.replace(spacecraft, duration=LM50.duration) == LM50
+    is_its_craft = dataclasses.replace(spacecraft, duration=LM50.duration) == LM50
+    return is_its_craft and world == IDEAL.name

@@ -46,7 +46,7 @@ class Flight:
     @property
     def is_the_papers(self) -> bool:
         """Whether the paper's results can stand beside this flight's."""
-        return is_the_papers(self.env.spacecraft)
+        return is_the_papers(self.env.spacecraft, self.env.world.name)
 
     @property
     def goal_deg(self) -> float:

@@ -7,6 +7,7 @@ from rich.table import Table
 from attjax.evaluation.paper import PAPER_TABLE_2, is_the_papers
 from attjax.evaluation.summary import STATISTICS
 from attjax.spacecraft import Spacecraft
+from attjax.world import IDEAL
 
 POINTING_ROWS = {
     "terminal φ, mean (°)": ("terminal", "error_deg", "mean"),
@@ -31,11 +32,11 @@ SYMBOLS = {"error_deg": "φ (°)", "rate_rad_s": "‖ω‖ (rad/s)"}
 def print_report(result: dict, spacecraft: Spacecraft) -> None:
     """Print one controller's name, conditions and statistics, as in ``eval.py --json``.
 
-    The paper's statistics stand beside those of its spacecraft, LM50.
+    The paper's statistics stand beside those of its spacecraft, LM50, in its world.
     """
     console = _console()
     console.print(f"{result['controller']}: {_conditions(result, spacecraft)}\n")
-    console.print(_table_2(result, is_the_papers(spacecraft)))
+    console.print(_table_2(result, is_the_papers(spacecraft, result["world"])))
     console.print()
     for name, value in _summary(result):
         console.print(f"{name:<18}{value}")
@@ -44,14 +45,14 @@ def print_report(result: dict, spacecraft: Spacecraft) -> None:
 def print_comparison(results: list[dict], spacecraft: Spacecraft) -> None:
     """Print several controllers' results over the same slews, side by side.
 
-    The paper's results stand beside those of its spacecraft, LM50.
+    The paper's results stand beside those of its spacecraft, LM50, in its world.
     """
     console = _console()
     console.print(f"{_conditions(results[0], spacecraft)}\n")
     table = _table("")
     for result in results:
         table.add_column(result["controller"], justify="right", no_wrap=True)
-    with_paper = is_the_papers(spacecraft)
+    with_paper = is_the_papers(spacecraft, results[0]["world"])
     if with_paper:
         table.add_column("paper", justify="right", no_wrap=True, style="dim")
     success = [f"{100 * r['success_rate']:.2f}" for r in results]
@@ -81,10 +82,12 @@ def _table(first_column):
 
 
 def _conditions(result, spacecraft):
+    craft = "" if is_the_papers(spacecraft) else f"{spacecraft.name}, "
+    world = "" if result["world"] == IDEAL.name else f"world {result['world']}, "
     return (
         f"{result['episodes']:,} slews at {result['control_hz']:.2f} Hz "
         f"(frameskip {result['frameskip']}) of {result['duration_s']:.2f} s, "
-        f"{'' if is_the_papers(spacecraft) else spacecraft.name + ', '}seed {result['seed']}"
+        f"{craft}{world}seed {result['seed']}"
     )
 
 

@@ -14,17 +14,21 @@ from attjax.world.aboard import Actuators, Uncertainty
 from attjax.world.distributions import LogUniform, Normal, Uniform
 from attjax.world.outside import Disturbances, Drag, Orbit, RadiationPressure, Sinusoid
 from attjax.world.parts import Part
+from attjax.world.telling import Gyro, Sensors, StarTracker
 
 __all__ = [
     "IDEAL",
     "Actuators",
     "Disturbances",
     "Drag",
+    "Gyro",
     "LogUniform",
     "Normal",
     "Orbit",
     "RadiationPressure",
+    "Sensors",
     "Sinusoid",
+    "StarTracker",
     "Uncertainty",
     "Uniform",
     "World",
@@ -33,11 +37,11 @@ __all__ = [
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class World(Part):
-    """Actuators, disturbances and what is uncertain; a part that is None is ideal.
+    """Sensors, actuators, disturbances and what is uncertain; a part that is None is ideal.
 
     Attributes:
-        name: for people.
-        orbit, actuators, disturbances, uncertainty: its parts.
+        name: for people; one that is not ideal is not called so, but "unnamed".
+        orbit, sensors, actuators, disturbances, uncertainty: its parts.
         own_disturbances: of a user's own, in Python only: hashable, with a method ``drawn(draws)``
             that makes an :class:`attjax.dynamics.disturbances.OwnDisturbance` for an episode, of
             its :class:`attjax.dynamics.draws.Draws`.
@@ -53,6 +57,7 @@ class World(Part):
 
     name: str = "ideal"
     orbit: Orbit | None = None
+    sensors: Sensors | None = None
     actuators: Actuators | None = None
     disturbances: Disturbances | None = None
     uncertainty: Uncertainty | None = None
@@ -62,6 +67,8 @@ class World(Part):
         super().__post_init__()
         if not isinstance(self.name, str) or not self.name.isprintable() or not self.name:
             raise ValueError(f"name is {self.name!r}; it must be a line of text")
+        if self.name == "ideal" and not self.is_ideal:
+            object.__setattr__(self, "name", "unnamed")
         needing = self.disturbances.in_orbit if self.disturbances else []
         if needing and self.orbit is None:
             raise ValueError(f"disturbances.{needing[0]} needs an orbit")
@@ -72,7 +79,7 @@ class World(Part):
     @property
     def is_ideal(self) -> bool:
         """Whether nothing in it differs from the paper's perfect world."""
-        parts = self.actuators, self.disturbances, self.uncertainty
+        parts = self.sensors, self.actuators, self.disturbances, self.uncertainty
         return not self.own_disturbances and all(x in (None, type(x)()) for x in parts)
 
     @classmethod
@@ -123,7 +130,7 @@ class World(Part):
 
 
 IDEAL = World()
-"""The paper's: torques are as commanded, and nothing else acts."""
+"""The paper's: the truth is told, torques are as commanded, and nothing else acts."""
 
 
 @functools.cache

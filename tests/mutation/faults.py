@@ -25,6 +25,7 @@ RUNS = [
     "tests/commands/test_command_line.py",
 ]
 WORLDS = ["tests/envs/test_worlds.py"]
+SENSORS = ["tests/envs/test_sensors.py"]
 FAULTS = {
     "sign of the gyroscopic term": (
         "attjax/dynamics/equations.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
@@ -232,6 +233,25 @@ FAULTS = {
     "a held torque that ends with its period": (
         "attjax/dynamics/actuators.py", "count = most_delay // rk4_steps + (2 if held else 1)",
         "count = most_delay // rk4_steps + 1", WORLDS,
+    ),
+    "a star tracker that looks along another axis": (
+        "attjax/dynamics/sensors.py", "(self.about - self.across) * along * axis",
+        "(self.about - self.across) * along * axis[::-1]", SENSORS,
+    ),
+    "noise of the gyro for any sampling time": (
+        "attjax/envs/sensors.py", "walk / jnp.sqrt(interval)", "walk", SENSORS,
+    ),
+    "latency left out": (
+        "attjax/dynamics/clock.py", "jnp.where(newest + self.latency <= end, newest, of_before)",
+        "newest", SENSORS,
+    ),
+    "a bias that only grows": (
+        "attjax/dynamics/sensors.py", "kept * self.wandered + fresh", "self.wandered + fresh",
+        SENSORS,
+    ),
+    "a sample of the agent step's end": (
+        "attjax/dynamics/forced_motion.py", "_chosen(number + 1 == sample, now, before)", "now",
+        SENSORS,
     ),
     "the inertia that is believed flies": (
         "attjax/envs/worlds.py",

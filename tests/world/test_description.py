@@ -49,6 +49,15 @@ BAD = [
     ({"actuators": {"gain": {"uniform": [0, 1], "truncated": [0, 1]}}}, "goes with normal"),
     ({"actuators": {"gain": "much"}}, "gain is 'much'; it must be a number"),
     ({"actuators": {"on_time_granularity": 1}}, "on_time_granularity is 1"),
+    ({"sensors": {"gyro": {"rate_hz": 7}}}, "sensors.gyro.rate_hz is 7; it must be 240 over"),
+    ({"sensors": {"gyro": {"angle_random_walk_deg_per_root_h": -1}}}, "per_root_h is -1; it must"),
+    ({"sensors": {"star_tracker": {"latency": 0.1}}}, "latency is given, and no rate_hz"),
+    (
+        {"sensors": {"star_tracker": {"rate_hz": 4, "latency": 0.3}}},
+        "latency is 0.3; it must be at",
+    ),
+    ({"sensors": {"star_tracker": {"boresight": [0, 0, 0]}}}, "boresight is all zeros"),
+    ({"sensors": {"sextant": {}}}, "sensors has the unknown name 'sextant'"),
     ({"uncertainty": {"moment_factor": [1, 2, 3]}}, "moment_factor is [1, 2, 3]"),
     ({"own_disturbances": [1]}, "own_disturbances can be given in Python only"),
     ([], "world is []; it must be a table"),
@@ -149,6 +158,12 @@ def test_support_is_what_can_be_drawn():
         assert number.support == support and distributions.largest(number) == support[1]
         assert distributions.from_table(distributions.to_table(number)) == number
     assert distributions.largest(3.0) == 3.0
+
+
+def test_only_the_ideal_world_is_called_so():
+    assert World(actuators=Actuators(gain=0.9)).name == "unnamed"
+    assert World.from_lists({"name": "ideal", "actuators": {"gain": 0.9}}).name == "unnamed"
+    assert World().name == World.from_lists({"actuators": {}}).name == "ideal"
 
 
 def test_there_is_no_other_name():
