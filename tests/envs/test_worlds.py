@@ -1,98 +1,17 @@
-"""What flies in an imperfect world, against independent accounts of each effect."""
+"""What is drawn for an episode in an imperfect world, and what becomes of commands there."""
 
 import dataclasses
-from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
-from bodies import LM50, random_spacecraft, rotated_inertia
-from imperfect import Oracle, vector
+from bodies import LM50
+from imperfect import Oracle
+from worlds import EFFECTS, flown, plants, start, world
 
 from attjax import AttitudeEnv, Spacecraft
 from attjax.envs import torques
 from attjax.world import IDEAL, World
-
-ORBIT = {"altitude_km": 500, "inclination_deg": 50}
-EFFECTS = {
-    "gravity gradient": {"gravity_gradient": True},
-    "dipole": {"residual_dipole": 0.5},
-    "drag": {"drag": {"area": 0.2, "lever_arm": 1, "density": 1e-12}},
-    "radiation": {"radiation_pressure": {"area": 2, "lever_arm": 1}},
-    "constant": {"constant_torque": 0.02},
-    "sinusoid": {"sinusoid": {"torque": 0.02, "period": 3}},
-}
-EFFECTS["all"] = {
-    name: value for effect in list(EFFECTS.values()) for name, value in effect.items()
-}
-
-
-def world(**tables):
-    return World.from_lists({"name": "test", "orbit": ORBIT, **tables})
-
-
-def start(env, seed=3):
-    """A state at the beginning of an episode that is turning already."""
-    state = env.reset(jax.random.key(seed), env.default_params)[1]
-    quaternion, rate, _ = (x[seed] for x in random_spacecraft(seed + 1))
-    return state.replace(quaternion=quaternion, angular_velocity=rate)
-
-
-def flown(env, state, actions):
-    step = jax.jit(lambda state, action: env.step_env(jax.random.key(0), state, action, params))
-    params = env.default_params
-    for action in actions:
-        state = step(state, jnp.asarray(action))[1]
-    return state
-
-
-@pytest.mark.parametrize("effect", EFFECTS)
-@pytest.mark.parametrize("inertia", [LM50, rotated_inertia()], ids=["diagonal", "full"])
-def test_disturbances_are_those_of_the_textbooks(x64, effect, inertia):
-    """Five agent steps of a slew, with pulses; the effect is far more than the tolerance."""
-    craft = Spacecraft(inertia=inertia.tolist(), torque_levels=(0.5, 0.05))
-    env = AttitudeEnv(20, spacecraft=craft, world=world(disturbances=EFFECTS[effect]))
-    state, actions = start(env), [1, 4, 0, 11, 6]
-    after = flown(env, state, actions)
-    table = np.asarray(env.default_params.torque_table)
-    pulses = {21 * n: table[action] for n, action in enumerate(actions)}
-    oracle = Oracle(state.plant)
-    quaternion, rate = oracle.fly(state.quaternion, state.angular_velocity, pulses, 105)
-    np.testing.assert_allclose(after.quaternion, quaternion, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(after.angular_velocity, rate, rtol=0, atol=1e-10)
-    undisturbed = flown(AttitudeEnv(20, spacecraft=craft), state.replace(plant=None), actions)
-    assert np.linalg.norm(after.angular_velocity - undisturbed.angular_velocity) > 1e-7
-
-
-def test_a_batch_and_an_accelerators_form_fly_alike():
-    """Single precision, many spacecraft: CPU's loops against the plain scan, and one by one."""
-    env = AttitudeEnv(20, world=world(disturbances=EFFECTS["all"], actuators={"delay": 5}))
-    params, keys = env.default_params, jax.random.split(jax.random.key(1), 16)
-
-    def fly(key, action):
-        return env.step_env(key, env.reset(key, params)[1], action, params)[1]
-
-    actions = jnp.arange(16)
-    together = jax.jit(jax.vmap(fly))(keys, actions)
-    for n in (0, 7):
-        alone = jax.jit(fly)(keys[n], actions[n])
-        np.testing.assert_allclose(together.quaternion[n], alone.quaternion, atol=1e-6)
-        np.testing.assert_allclose(together.angular_velocity[n], alone.angular_velocity, atol=1e-6)
-
-
-def test_derivatives_pass_through():
-    env = AttitudeEnv(3, world=world(disturbances=EFFECTS["all"]))
-    state = start(env)
-
-    def rate(quaternion):
-        after = env.step_env(jax.random.key(0), state.replace(quaternion=quaternion), 1, params)
-        return after[1].angular_velocity
-
-    params = env.default_params
-    forward = jax.jacfwd(rate)(state.quaternion)
-    np.testing.assert_allclose(jax.jacrev(rate)(state.quaternion), forward, atol=1e-7)
-    assert np.all(np.isfinite(forward)) and np.any(forward)
 
 
 @pytest.mark.parametrize("delay", [1, 7, 30])
@@ -184,37 +103,6 @@ def test_what_the_controller_believes_is_not_what_flies():
     np.testing.assert_allclose(kick, expected, rtol=2e-3)
 
 
-class Rubbing(NamedTuple):
-    strength: jax.Array
-
-    def torque(self, quaternion, angular_velocity):
-        return tuple(-self.strength * rate for rate in angular_velocity)
-
-
-@dataclasses.dataclass(frozen=True)
-class Cable:
-    strength: float
-
-    def drawn(self, draws):
-        return Rubbing(draws.number("cable", self.strength))
-
-
-def test_a_disturbance_of_ones_own_acts(x64):
-    """Against the closed form: about a principal axis, the rate falls exponentially."""
-    env = AttitudeEnv(20, world=World(name="cable", own_disturbances=(Cable(0.05),)))
-    assert not env.world.is_ideal
-    state = env.reset(jax.random.key(0), env.default_params)[1]
-    state = state.replace(angular_velocity=jnp.array([0.3, 0.0, 0.0]))
-    after = flown(env, state, [0] * 10)
-    expected = 0.3 * np.exp(-0.05 / LM50[0] * 10 * 21 / 240)
-    np.testing.assert_allclose(after.angular_velocity, [expected, 0, 0], atol=1e-12)
-
-
-def plants(env, count=4000):
-    keys = jax.random.split(jax.random.key(5), count)
-    return jax.jit(jax.vmap(lambda key: env.reset(key, env.default_params)[1].plant))(keys)
-
-
 def test_draws_are_as_described():
     """Ranges, means and independence of what is drawn, over 4,000 episodes."""
     ball = (0.5, 0.5, 0.5)  # no draw of which is impossible
@@ -261,27 +149,6 @@ def test_no_drawn_inertia_is_impossible():
     assert np.all(moments[:, 2] <= (moments[:, 0] + moments[:, 1]) * (1 + 1e-6))
 
 
-def test_the_earths_field_is_a_tilted_dipoles(x64):
-    """Closed form: over the magnetic poles twice that over the equator, as much at each; tilt."""
-    env = AttitudeEnv(5, world=world(disturbances={"residual_dipole": 1.0}))
-    state = start(env)
-    _, earth = state.plant.disturbances.dipole
-    pole, first, second = (vector(x) for x in (earth.pole, earth.first, earth.second))
-    dipole = pole + first
-    np.testing.assert_allclose(np.linalg.norm(dipole), 1)
-    np.testing.assert_allclose(np.degrees(np.arccos(np.linalg.norm(pole))), 9.41, atol=1e-6)
-    normal = np.cross(vector(state.plant.orbit.node), vector(state.plant.orbit.ahead))
-    np.testing.assert_allclose(-pole @ normal / np.linalg.norm(pole), np.cos(np.deg2rad(50)))
-    np.testing.assert_allclose(np.cross(first, second) @ pole < 0, True)  # eastwards about north
-    still = earth._replace(start=0.0)
-    over_pole, over_equator = (
-        np.linalg.norm(vector(still.field(tuple(up), 0.0)))
-        for up in (dipole, np.cross(dipole, pole) / np.linalg.norm(np.cross(dipole, pole)))
-    )
-    np.testing.assert_allclose(over_equator, 2.98e-5 * (6371 / 6871) ** 3)
-    np.testing.assert_allclose(over_pole, 2 * over_equator)
-
-
 def test_the_ideal_world_is_no_world_at_all():
     """The same program, and the same state, as without one."""
     env, plain = AttitudeEnv(5, world=World(name="nothing in it")), AttitudeEnv(5)
@@ -293,14 +160,3 @@ def test_the_ideal_world_is_no_world_at_all():
     ]
     assert text[0] == text[1]
     assert IDEAL.is_ideal and dataclasses.replace(IDEAL, orbit=None).is_ideal
-
-
-def test_orbit_keeps_the_target_still():
-    """Directions in the target's frame: uniform, and node, flight and normal at right angles."""
-    drawn = plants(AttitudeEnv(5, world=world(disturbances={"gravity_gradient": True})), 500)
-    node, ahead = (np.stack(x, axis=-1) for x in (drawn.orbit.node, drawn.orbit.ahead))
-    np.testing.assert_allclose(np.sum(node * ahead, axis=-1), 0, atol=1e-6)
-    np.testing.assert_allclose(np.linalg.norm(node, axis=-1), 1, atol=1e-6)
-    np.testing.assert_allclose(node.mean(axis=0), 0, atol=0.1)
-    radius = 6.871e6
-    np.testing.assert_allclose(drawn.orbit.rate, np.sqrt(3.986004418e14 / radius**3), rtol=1e-5)

@@ -1,5 +1,7 @@
 """Deliberate faults that no rule of mutants.py makes, each with the tests that should see it."""
 
+from world_faults import WORLD_FAULTS
+
 PHYSICS = [
     "tests/test_truth.py",
     "tests/dynamics/test_propagation.py",
@@ -24,8 +26,6 @@ RUNS = [
     "tests/runs/test_metrics.py",
     "tests/commands/test_command_line.py",
 ]
-WORLDS = ["tests/envs/test_worlds.py"]
-SENSORS = ["tests/envs/test_sensors.py"]
 FAULTS = {
     "sign of the gyroscopic term": (
         "attjax/dynamics/equations.py", "((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)",
@@ -196,67 +196,5 @@ FAULTS = {
     "no lock on the folder": (
         "attjax/runs/folder.py", "fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,
     ),
-    "gravity gradient of the other sign": (
-        "attjax/dynamics/disturbances.py", "vectors.cross(up, vectors.times(self.gravity[1], up))",
-        "vectors.cross(vectors.times(self.gravity[1], up), up)", WORLDS,
-    ),
-    "gravity gradient without its factor 3": (
-        "attjax/dynamics/disturbances.py", "3**0.5 * orbit.rate", "orbit.rate", WORLDS,
-    ),
-    "disturbances in the target's frame instead of the body's": (
-        "attjax/dynamics/disturbances.py", "attitude = vectors.attitude_matrix(quaternion)",
-        "attitude = tuple(zip(*vectors.attitude_matrix(quaternion)))", WORLDS,
-    ),
-    "drag with the flight": (
-        "attjax/dynamics/disturbances.py", "levers.append((self.drag, vectors.scaled(-1, along)))",
-        "levers.append((self.drag, along))", WORLDS,
-    ),
-    "sunlight from behind": (
-        "attjax/dynamics/disturbances.py", "levers.append((lever, vectors.scaled(-1, sun)))",
-        "levers.append((lever, sun))", WORLDS,
-    ),
-    "the Earth's dipole points north": (
-        "attjax/envs/worlds.py", "pole=tuple(-math.cos(tilt) * pole)",
-        "pole=tuple(math.cos(tilt) * pole)", WORLDS,
-    ),
-    "the Earth turns westwards": (
-        "attjax/envs/worlds.py", "second=tuple(-math.sin(tilt) * jnp.cross(pole, node))",
-        "second=tuple(math.sin(tilt) * jnp.cross(pole, node))", WORLDS,
-    ),
-    "altitude taken for the radius": (
-        "attjax/envs/worlds.py", "radius = EARTH_RADIUS + 1e3", "radius = 1e3", WORLDS,
-    ),
-    "a pulse one RK4 step late": (
-        "attjax/dynamics/forced_motion.py", "_chosen(pulse.start == number,",
-        "_chosen(pulse.start + 1 == number,", WORLDS,
-    ),
-    "a held torque that ends with its period": (
-        "attjax/dynamics/actuators.py", "count = most_delay // rk4_steps + (2 if held else 1)",
-        "count = most_delay // rk4_steps + 1", WORLDS,
-    ),
-    "a star tracker that looks along another axis": (
-        "attjax/dynamics/sensors.py", "(self.about - self.across) * along * axis",
-        "(self.about - self.across) * along * axis[::-1]", SENSORS,
-    ),
-    "noise of the gyro for any sampling time": (
-        "attjax/envs/sensors.py", "walk / jnp.sqrt(interval)", "walk", SENSORS,
-    ),
-    "latency left out": (
-        "attjax/dynamics/clock.py", "jnp.where(newest + self.latency <= end, newest, of_before)",
-        "newest", SENSORS,
-    ),
-    "a bias that only grows": (
-        "attjax/dynamics/sensors.py", "kept * self.wandered + fresh", "self.wandered + fresh",
-        SENSORS,
-    ),
-    "a sample of the agent step's end": (
-        "attjax/dynamics/forced_motion.py", "_chosen(number + 1 == sample, now, before)", "now",
-        SENSORS,
-    ),
-    "the inertia that is believed flies": (
-        "attjax/envs/worlds.py",
-        "inertia = drawn_inertia(world.uncertainty, draws, params.inertia)",
-        "inertia = params.inertia", WORLDS,
-    ),
-}  # fmt: skip
+} | WORLD_FAULTS  # fmt: skip
 """By name: module, code, what it becomes, tests that should catch it."""
