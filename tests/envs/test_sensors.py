@@ -4,7 +4,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from bodies import LM50
 from scipy.spatial.transform import Rotation
 
 from attjax import AttitudeEnv, World
@@ -190,4 +189,3 @@ def test_the_observation_is_what_is_measured():
         true = np.rad2deg(Rotation.from_quat(state.quaternion).magnitude())
         shown = float(info["outcome"]["terminal_error_deg"])
         assert min(abs(shown - true), abs(360 - shown - true)) < 1e-2
-    assert len(LM50) == 3
