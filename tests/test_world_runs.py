@@ -54,6 +54,22 @@ def test_the_same_seed_is_the_same_world(folder, capsys):
 
 
 @pytest.mark.parametrize(
+    "content",
+    [
+        "[uncertainty]\ninertia_factor = 1.1\n",
+        "[actuators]\ndelay = 3\n",
+        "[sensors.gyro]\nresolution = 1e-6\n",
+    ],
+)
+def test_a_world_with_one_part_flies(tmp_path, capsys, content):
+    """What it lacks is nothing at all in the program: XLA crashed on a loop with no results."""
+    file = tmp_path / "one_part.toml"
+    file.write_text(content)
+    result = judged(capsys, "--controller=feedback", f"--world={file}")
+    assert result["world"] == "one_part" and result["success_rate"] > 0
+
+
+@pytest.mark.parametrize(
     "content, said",
     [
         ("[actuators]\ndelay = 20000\n", "delay is 20000"),

@@ -84,8 +84,7 @@ class Actuators(struct.PyTreeNode):
         return fixed + jnp.round(draws.number("delay_jitter", self.jitter))
 
 
-@struct.dataclass
-class Queue:
+class Queue(struct.PyTreeNode):
     """Pulses on their way, in the order of their commands.
 
     Attributes:

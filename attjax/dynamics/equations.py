@@ -153,11 +153,15 @@ class EquationsOfMotion(NamedTuple):
         """The same with the commanded torque off."""
         return self._replace(torque=None)
 
-    steps_together = 7
-    """RK4 steps in one loop over a batch, or in one kernel: three such are the paper's 21."""
+    @property
+    def steps_together(self) -> int:
+        """RK4 steps in one loop over a batch, or in one kernel: three such are the paper's 21."""
+        return 7
 
-    is_timed = False
-    """Whether they are told which RK4 step of an agent step it is, counted from 0."""
+    @property
+    def is_timed(self) -> bool:
+        """Whether they are told which RK4 step of an agent step it is, counted from 0."""
+        return False
 
     def during(self, number: Any, state: RigidState) -> "EquationsOfMotion":
         """The equations of that RK4 step, which begins with this state: here always the same."""

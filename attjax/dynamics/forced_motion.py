@@ -30,7 +30,7 @@ class ForcedState(NamedTuple):
     quaternion: tuple
     angular_velocity: Vector
     phasor: tuple[Any, Any] | None
-    seen: tuple[tuple | None, Vector | None] = (None, None)
+    seen: tuple[Any, ...] = (None, None)
 
 
 class Pulse(NamedTuple):
@@ -106,12 +106,18 @@ class ForcedEquations(NamedTuple):
     swinging: tuple[Vector, Any] | None
     own: tuple[OwnDisturbance, ...]
     kinematics: Kinematics
-    samples: tuple[Any | None, Any | None] = (None, None)
+    samples: tuple[Any, Any] = (None, None)
     torque: Vector | None = None
 
-    steps_together = 3
-    is_timed = True
-    """As of :class:`attjax.dynamics.equations.EquationsOfMotion`; more would not fit registers."""
+    @property
+    def steps_together(self) -> int:
+        """RK4 steps in one loop; of more the intermediate results would not fit the registers."""
+        return 3
+
+    @property
+    def is_timed(self) -> bool:
+        """They are told which RK4 step it is, as pulses and samples have theirs."""
+        return True
 
     def during(self, number: Any, state: ForcedState) -> "ForcedEquations":
         """The equations of that RK4 step, counted from 0: its pulses' torque is on."""
@@ -135,7 +141,7 @@ class ForcedEquations(NamedTuple):
         """Rate of change of the state."""
         torques, phasor_rate = [self.torque, self.acting.torque(state.quaternion)], None
         torques += [x.torque(state.quaternion, state.angular_velocity) for x in self.own]
-        if self.swinging is not None:
+        if self.swinging is not None and state.phasor is not None:
             (cosine, sine), (amplitude, rate) = state.phasor, self.swinging
             torques.append(vectors.scaled(sine, amplitude))
             phasor_rate = -rate * sine, rate * cosine

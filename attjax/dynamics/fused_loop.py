@@ -128,6 +128,8 @@ def together(function: Callable[..., Tree], *operands: Any) -> Tree:
         >>> float(jax.grad(lambda x: together(lambda y: y**3, x))(2.0))
         12.0
     """
+    if not jax.tree.leaves(jax.eval_shape(function, *operands)):
+        return function(*operands)  # the compiler crashes on a reduction of nothing
     return jax.lax.platform_dependent(
         *operands, cpu=functools.partial(one_loop, function), default=function
     )

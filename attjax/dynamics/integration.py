@@ -40,7 +40,7 @@ class AgentStep(NamedTuple):
 class Turn(NamedTuple):
     """Which of the later RK4 steps comes next, and how many are taken, None: all; as floats."""
 
-    number: Float[Array, ""]
+    number: Float[Array | np.ndarray, ""]
     limit: Float[Array, ""] | None
 
 

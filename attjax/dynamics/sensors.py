@@ -55,7 +55,7 @@ class Gyro(struct.PyTreeNode):
 
         Exactly as a Gauss-Markov process of first order does in that time.
         """
-        if self.wandering is None:
+        if self.wandering is None or self.wandered is None:
             return self
         kept = jnp.exp(-seconds / self.correlation_time)
         fresh = self.wandering * jnp.sqrt(1 - kept**2) * noise

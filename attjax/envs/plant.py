@@ -71,7 +71,7 @@ class Plant(struct.PyTreeNode):
         phasor = self._phasor(time * period)
         start = ForcedState(tuple(quaternion), tuple(angular_velocity), phasor, _unseen(samples))
         equations = self._equations(agent_step, (time + 0.5) * period)._replace(samples=samples)
-        change = integration.change(agent_step, start, equations, limit)
+        change: Any = integration.change(agent_step, start, equations, limit)
         end = _attained(start, change.quaternion, change.angular_velocity)
         plant = self.replace(queue=self.queue.later(rk4_steps))
         if self.sensing is not None:

@@ -34,8 +34,9 @@ def drawn_sensing(
     """
     if sensors is None or sensors == Sensors():
         return None
-    tracker = sensors.star_tracker and _tracker(sensors.star_tracker, draws)
-    gyro = sensors.gyro and _gyro(sensors.gyro, draws, period)
+    given = sensors.star_tracker, sensors.gyro
+    tracker = None if given[0] is None else _tracker(given[0], draws)
+    gyro = None if given[1] is None else _gyro(given[1], draws, period)
     return Sensing.begun((tracker, gyro), state, draws)
 
 

@@ -27,9 +27,8 @@ def step(
         state: the spacecraft before the step.
         action: integer scalar, row of the torque table (Table 1); or (3,) real, as
             :func:`applied_torque` says.
-        params: spacecraft, the paper's by default; they also say whether its torques are held.
-        frameskip: RK4 steps after the first (static); if ``params.frameskip`` says how many, the
-            most there may be.
+        params: spacecraft, the paper's by default, and whether its torques are held.
+        frameskip: RK4 steps after the first (static), or the most that ``params.frameskip`` says.
         kinematic_factor: what stands in place of Eq. 9's ½ (static).
         actions: "discrete" or "continuous", to take only integers or only fractions.
 

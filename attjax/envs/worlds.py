@@ -1,6 +1,7 @@
 """A plant as a world's description has it, drawn for one episode."""
 
 import math
+from typing import Any
 
 import chex
 import jax
@@ -84,7 +85,7 @@ def _disturbances(world, draws, inertia, orbit):
     given = world.disturbances
     if given is None:
         return Disturbances()
-    moments_or_rows = tuple(inertia) if inertia.ndim == 1 else tuple(map(tuple, inertia))
+    moments_or_rows: Any = tuple(inertia) if inertia.ndim == 1 else tuple(map(tuple, inertia))
     return Disturbances(
         gravity_gradient=moments_or_rows if given.gravity_gradient else None,
         dipole=_dipole(world, draws, orbit) if given.residual_dipole != 0 else None,

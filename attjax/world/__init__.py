@@ -3,17 +3,10 @@
 This package imports nothing heavy, so that errors in a description are instant.
 """
 
-import dataclasses
-import functools
-from importlib import resources
-from pathlib import Path
-from typing import Any, Self
-
-from attjax.spacecraft import read_toml
 from attjax.world.aboard import Actuators, Uncertainty
+from attjax.world.description import IDEAL, World, names
 from attjax.world.distributions import LogUniform, Normal, Uniform
 from attjax.world.outside import Disturbances, Drag, Orbit, RadiationPressure, Sinusoid
-from attjax.world.parts import Part
 from attjax.world.telling import Gyro, Sensors, StarTracker
 
 __all__ = [
@@ -32,109 +25,5 @@ __all__ = [
     "Uncertainty",
     "Uniform",
     "World",
+    "names",
 ]
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class World(Part):
-    """Sensors, actuators, disturbances and what is uncertain; a part that is None is ideal.
-
-    Attributes:
-        name: for people; one that is not ideal is not called so, but "unnamed".
-        orbit, sensors, actuators, disturbances, uncertainty: its parts.
-        own_disturbances: of a user's own, in Python only: hashable, with a method ``drawn(draws)``
-            that makes an :class:`attjax.dynamics.disturbances.OwnDisturbance` for an episode, of
-            its :class:`attjax.dynamics.draws.Draws`.
-
-    Raises:
-        ValueError: a value is not as its part says, or a disturbance needs an orbit.
-
-    Example:
-        >>> from attjax.world import Actuators, Uniform, World
-        >>> World(name="late", actuators=Actuators(delay=Uniform(2, 6))).is_ideal
-        False
-    """
-
-    name: str = "ideal"
-    orbit: Orbit | None = None
-    sensors: Sensors | None = None
-    actuators: Actuators | None = None
-    disturbances: Disturbances | None = None
-    uncertainty: Uncertainty | None = None
-    own_disturbances: tuple[Any, ...] = ()
-
-    def __post_init__(self):
-        super().__post_init__()
-        if not isinstance(self.name, str) or not self.name.isprintable() or not self.name:
-            raise ValueError(f"name is {self.name!r}; it must be a line of text")
-        if self.name == "ideal" and not self.is_ideal:
-            object.__setattr__(self, "name", "unnamed")
-        needing = self.disturbances.in_orbit if self.disturbances else []
-        if needing and self.orbit is None:
-            raise ValueError(f"disturbances.{needing[0]} needs an orbit")
-
-    def __str__(self):
-        return self.name
-
-    @property
-    def is_ideal(self) -> bool:
-        """Whether nothing in it differs from the paper's perfect world."""
-        parts = self.sensors, self.actuators, self.disturbances, self.uncertainty
-        return not self.own_disturbances and all(x in (None, type(x)()) for x in parts)
-
-    @classmethod
-    def from_toml(cls, path: str | Path) -> Self:
-        """Read a TOML file; without a name, the world has the file's.
-
-        Raises:
-            OSError: it cannot be read.
-            ValueError: it is no TOML, or something in it is not as said.
-        """
-        return cls.from_lists({"name": Path(path).stem} | read_toml(path))
-
-    @classmethod
-    def from_lists(cls, values: Any) -> Self:
-        """A world from what TOML or JSON make of its tables.
-
-        Raises:
-            ValueError: a name is unknown or missing, or a value is not as said.
-        """
-        if isinstance(values, dict) and values.get("own_disturbances"):
-            raise ValueError("own_disturbances can be given in Python only")
-        try:
-            return cls.from_table(values, "world")
-        except ValueError as error:
-            raise ValueError(str(error).removeprefix("world.")) from None
-
-    @classmethod
-    def of(cls, world: "World | str") -> "World":
-        """The world itself, or that of a name.
-
-        Raises:
-            ValueError: there is none of that name.
-        """
-        return cls.named(world) if isinstance(world, str) else world
-
-    @classmethod
-    def named(cls, name: str) -> "World":
-        """One of the named worlds.
-
-        Raises:
-            ValueError: there is none of that name.
-        """
-        if name == IDEAL.name:
-            return IDEAL
-        if name not in names():
-            raise ValueError(f"world is {name!r}; it must be one of {', '.join(names())}")
-        return cls.from_toml(Path(str(resources.files("attjax.world") / f"{name}.toml")))
-
-
-IDEAL = World()
-"""The paper's: the truth is told, torques are as commanded, and nothing else acts."""
-
-
-@functools.cache
-def names() -> tuple[str, ...]:
-    """Names of the named worlds."""
-    found = (Path(str(x)) for x in resources.files("attjax.world").iterdir())
-    return (IDEAL.name, *sorted(x.stem for x in found if x.suffix == ".toml"))

@@ -8,7 +8,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from attjax.dynamics.fused_loop import FOUND, GIVEN, NOTHING, any_order, apart, one_kernel, one_loop
+from attjax.dynamics.fused_loop import (
+    FOUND,
+    GIVEN,
+    NOTHING,
+    any_order,
+    apart,
+    one_kernel,
+    one_loop,
+    together,
+)
 
 BOTH = pytest.mark.parametrize("call", [one_loop, one_kernel])
 
@@ -82,6 +91,21 @@ def test_the_reducer_is_a_call(call):
         around = "stablehlo.constant", "stablehlo.compare", "call @_where"
         operations = [line for line in operations if not any(x in line for x in around)]
     assert len(operations) == 2 and "call @" in operations[0] and "return" in operations[1]
+
+
+def test_nothing_together_is_no_loop():
+    """As of a world in which nothing acts: the compiler would crash on a reduction of nothing."""
+    assert jax.jit(jax.vmap(lambda x: together(lambda y: (None, ()), x)))(jnp.ones(3)) == (None, ())
+    given = jax.make_jaxpr(lambda x: together(lambda y: {}, x))(1.0)
+    assert "reduce" not in str(given)
+
+
+def test_together_has_the_functions_values_and_derivatives():
+    x = jnp.linspace(-1, 2, 7)
+    ours = jax.jit(jax.vmap(lambda x: together(lambda y: (y**2, jnp.sin(y)), x)))(x)
+    np.testing.assert_allclose(ours, (x**2, np.sin(x)), atol=1e-6)
+    slope = jax.vmap(jax.grad(lambda x: together(jnp.sin, x)))(x)
+    np.testing.assert_allclose(slope, np.cos(x), atol=1e-6)
 
 
 def test_what_is_looked_up_comes_apart():
