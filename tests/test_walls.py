@@ -11,7 +11,8 @@ from sources import ALIASES, MODULES, SOURCES, imports, module_name, modules_aft
 from attjax import errors
 
 WITHOUT_JAX = (
-    "values", "streams", "errors", "destinations", "resources", "spacecraft", "config",
+    "values", "streams", "errors", "destinations", "resources", "spacecraft", "world",
+    "config",
 )  # fmt: skip
 JAX = {"jax", "jaxlib", "jaxtyping", "flax", "optax", "chex", "orbax"}
 OF_SPACECRAFT = {"spacecraft", "simulator", "initial_state", "reward", "attitude"}

@@ -49,15 +49,18 @@ def evaluate(
 
 
 def conditions(env: AttitudeEnv, params: EnvParams, seed: int, episodes: int) -> dict:
-    """What the episodes of :func:`fly` have in common, for ``eval.py --json``."""
+    """What the episodes of :func:`fly` have in common, for ``eval.py --json``.
+
+    Their world's name is told where it is not the ideal one.
+    """
+    world = {} if env.world.is_ideal else {"world": env.world.name}
     return {
         "episodes": integer(episodes),
         "frameskip": env.frameskip,
         "control_hz": 1 / env.control_period,
         "duration_s": int(params.max_steps_in_episode) * env.control_period,
         "seed": integer(seed),
-        "world": env.world.name,
-    }
+    } | world
 
 
 def statistics(flown: Episodes, env: AttitudeEnv, params: EnvParams) -> dict:

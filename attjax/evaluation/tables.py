@@ -36,7 +36,7 @@ def print_report(result: dict, spacecraft: Spacecraft) -> None:
     """
     console = _console()
     console.print(f"{result['controller']}: {_conditions(result, spacecraft)}\n")
-    console.print(_table_2(result, is_the_papers(spacecraft, result["world"])))
+    console.print(_table_2(result, is_the_papers(spacecraft, _world(result))))
     console.print()
     for name, value in _summary(result):
         console.print(f"{name:<18}{value}")
@@ -52,7 +52,7 @@ def print_comparison(results: list[dict], spacecraft: Spacecraft) -> None:
     table = _table("")
     for result in results:
         table.add_column(result["controller"], justify="right", no_wrap=True)
-    with_paper = is_the_papers(spacecraft, results[0]["world"])
+    with_paper = is_the_papers(spacecraft, _world(results[0]))
     if with_paper:
         table.add_column("paper", justify="right", no_wrap=True, style="dim")
     success = [f"{100 * r['success_rate']:.2f}" for r in results]
@@ -81,9 +81,13 @@ def _table(first_column):
     return table
 
 
+def _world(result):
+    return result.get("world", IDEAL.name)
+
+
 def _conditions(result, spacecraft):
     craft = "" if is_the_papers(spacecraft) else f"{spacecraft.name}, "
-    world = "" if result["world"] == IDEAL.name else f"world {result['world']}, "
+    world = "" if _world(result) == IDEAL.name else f"world {_world(result)}, "
     return (
         f"{result['episodes']:,} slews at {result['control_hz']:.2f} Hz "
         f"(frameskip {result['frameskip']}) of {result['duration_s']:.2f} s, "

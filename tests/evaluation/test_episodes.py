@@ -189,7 +189,6 @@ def test_conditions_and_settling_times_worked_by_hand():
         "control_hz": 40.0,
         "duration_s": 10.0,
         "seed": 7,
-        "world": "ideal",
     }
     assert evaluation.successes(flown, params).tolist() == [True, True, False, False]
     np.testing.assert_allclose(evaluation.settling_times(flown, env), [0.025, 2, 0.25, 10.025])
