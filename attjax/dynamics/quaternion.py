@@ -12,6 +12,7 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Float, Real
 
 from attjax import checks
+from attjax.dynamics import vectors
 from attjax.dynamics.numerics import polar_angle, square_root, squared_norm, unit
 
 
@@ -50,14 +51,8 @@ def rotation_matrix(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, 
         >>> [round(x.item()) for x in rotation_matrix(quarter) @ jnp.array([1.0, 0.0, 0.0])]
         [0, 1, 0]
     """
-    q1, q2, q3, qs = checks.real("quaternion", quaternion, (4,))
-    return jnp.stack(
-        [
-            jnp.stack([1 - 2 * (q2**2 + q3**2), 2 * (q1 * q2 - qs * q3), 2 * (q1 * q3 + qs * q2)]),
-            jnp.stack([2 * (q1 * q2 + qs * q3), 1 - 2 * (q1**2 + q3**2), 2 * (q2 * q3 - qs * q1)]),
-            jnp.stack([2 * (q1 * q3 - qs * q2), 2 * (q2 * q3 + qs * q1), 1 - 2 * (q1**2 + q2**2)]),
-        ]
-    )
+    rows = vectors.attitude_matrix(tuple(checks.real("quaternion", quaternion, (4,))))
+    return jnp.stack([jnp.stack(row) for row in rows]).T
 
 
 def derivative(

@@ -3,11 +3,10 @@
 import dataclasses
 from typing import Annotated
 
+from attjax.spacecraft import INTEGRATION_STEP
 from attjax.values import LARGEST, check_number, integer, shown
 from attjax.world.distributions import Number, largest
 from attjax.world.parts import Part, Range
-
-RK4_STEPS_A_SECOND = 240
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -61,7 +60,7 @@ class Actuators(Part):
     def __post_init__(self):
         super().__post_init__()
         check_number("minimum_impulse", self.minimum_impulse, 0, LARGEST)
-        check_number("on_time_granularity", self.on_time_granularity, 0, 1 / RK4_STEPS_A_SECOND)
+        check_number("on_time_granularity", self.on_time_granularity, 0, INTEGRATION_STEP)
         for name in ("dead_levels", "faulty_axes"):
             values = getattr(self, name)
             if not isinstance(values, tuple) or not all((integer(x) or 0) >= 1 for x in values):

@@ -3,11 +3,12 @@
 import dataclasses
 from typing import Annotated
 
+from attjax.spacecraft import INTEGRATION_STEP
 from attjax.values import check_number
 from attjax.world.distributions import Number
 from attjax.world.parts import Part, Range, check_direction
 
-RK4_STEPS_A_SECOND = 240
+RK4_STEPS_A_SECOND = round(1 / INTEGRATION_STEP)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
