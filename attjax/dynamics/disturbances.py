@@ -111,7 +111,7 @@ class Disturbances(NamedTuple):
             lever, sun = self.radiation
             levers.append((lever, vectors.scaled(-1, sun)))
         products = [vectors.outer(lever, force) for lever, force in levers]
-        levers_sum = functools.reduce(vectors.add_matrices, products) if products else None
+        levers_sum = functools.reduce(vectors.add, products) if products else None
         return Acting(gravity, levers_sum, self.constant)
 
 

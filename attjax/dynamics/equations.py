@@ -7,9 +7,8 @@ more component of the state.
 """
 
 import dataclasses
-import operator
 from collections.abc import Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import chex
 import jax
@@ -18,9 +17,8 @@ import numpy as np
 
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
+from attjax.dynamics.vectors import Vector, add
 
-Tree = TypeVar("Tree")
-Vector = tuple[chex.Array, chex.Array, chex.Array]
 Products = tuple[chex.Array, chex.Array, chex.Array, chex.Array, chex.Array, chex.Array]
 
 PRODUCTS = ((1, 2), (2, 0), (0, 1), (0, 0), (1, 1), (2, 2))
@@ -182,8 +180,3 @@ class EquationsOfMotion(NamedTuple):
             quaternion=self.kinematics.rate(state.quaternion, state.angular_velocity),
             angular_velocity=acceleration,
         )
-
-
-def add(tree: Tree, other: Tree) -> Tree:
-    """The sum of two trees of the same structure, leaf by leaf."""
-    return jax.tree.map(operator.add, tree, other)

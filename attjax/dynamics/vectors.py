@@ -3,15 +3,19 @@
 For what stands in a loop over RK4 steps, where JAX's arrays of three would be slow.
 """
 
-from typing import Any, TypeAlias
+import operator
+from typing import Any, TypeAlias, TypeVar
 
+import jax
+
+Tree = TypeVar("Tree")
 Vector: TypeAlias = tuple[Any, Any, Any]
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
 
 
-def add(a: Vector, b: Vector) -> Vector:
-    """The sum a + b."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+def add(tree: Tree, other: Tree) -> Tree:
+    """The sum of two vectors, or of any two trees of the same structure, leaf by leaf."""
+    return jax.tree.map(operator.add, tree, other)
 
 
 def scaled(factor: Any, a: Vector) -> Vector:
@@ -46,11 +50,6 @@ def cross(a: Vector, b: Vector) -> Vector:
 def outer(a: Vector, b: Vector) -> Matrix:
     """The matrix a bᵀ."""
     return scaled(a[0], b), scaled(a[1], b), scaled(a[2], b)
-
-
-def add_matrices(a: Matrix, b: Matrix) -> Matrix:
-    """The sum of two matrices."""
-    return add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2])
 
 
 def times(matrix: Matrix | Vector, a: Vector) -> Vector:
