@@ -4,12 +4,14 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from attjax.control.flight_loop import flight_loop
     from attjax.envs.attitude import AttitudeEnv
     from attjax.envs.batch import open_loop
     from attjax.envs.parameters import EnvParams, EnvState
     from attjax.envs.simulator import step
     from attjax.evaluation import evaluate
     from attjax.runs.checkpoint import load_policy
+    from attjax.runs.flight import load_flight_loop
     from attjax.runs.trainer import train
     from attjax.spacecraft import LM50, Spacecraft
     from attjax.world import World
@@ -22,6 +24,8 @@ __all__ = [
     "Spacecraft",
     "World",
     "evaluate",
+    "flight_loop",
+    "load_flight_loop",
     "load_policy",
     "open_loop",
     "step",
@@ -37,6 +41,8 @@ _MODULES = {
     "Spacecraft": "attjax.spacecraft",
     "World": "attjax.world",
     "evaluate": "attjax.evaluation",
+    "flight_loop": "attjax.control.flight_loop",
+    "load_flight_loop": "attjax.runs.flight",
     "load_policy": "attjax.runs.checkpoint",
     "open_loop": "attjax.envs.batch",
     "step": "attjax.envs.simulator",

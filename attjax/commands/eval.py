@@ -52,6 +52,11 @@ def _add_who(group):
     who.add_argument("--compare", action="store_true", help=compare_help)
     sampled_help = "let the policy draw its actions as in training, not take the most probable"
     group.add_argument("--sampled", action="store_true", help=sampled_help)
+    bare_help = (
+        "tell the controllers what the sensors say; otherwise an estimator filters it, and a "
+        "predictor looks ahead of known delays (the same where the world is ideal)"
+    )
+    group.add_argument("--bare", action="store_true", help=bare_help)
     actions_help = (
         "how classical controllers without checkpoint act: by one of the torques (default), or by "
         "any about the three axes at once; a policy acts as it was trained to"
@@ -104,7 +109,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             arguments.frameskip = fields.frameskip_to_judge(trained or ())
         spacecraft = evaluation_subject.spacecraft(arguments, config)
         env = evaluation_subject.env(arguments, config, spacecraft)
-        controllers = {name: _controller(name, arguments, env, config) for name in names}
+        controllers = {name: _flown(name, arguments, env, config) for name in names}
         if arguments.json not in (None, STDOUT):
             destinations.check("--json", arguments.json)
         evaluation_output.prepare_playback(
@@ -167,10 +172,17 @@ def _write_playback(arguments, controllers, env, params):
 
     name = next(iter(controllers))
     other = "feedback" if name == "phase-plane" else "phase-plane"
-    shown = {name: controllers[name], other: _controller(other, arguments, env, None)}
+    shown = {name: controllers[name], other: _flown(other, arguments, env, None)}
     checkpoint = arguments.checkpoint.resolve().name if name == POLICY else None
     page = playback.page(shown, env, params, arguments.seed or 0, checkpoint)
     evaluation_output.write_text(arguments.playback, page)
+
+
+def _flown(name, arguments, env, config):
+    from attjax.control.flight_loop import flight_loop
+
+    controller = _controller(name, arguments, env, config)
+    return controller if arguments.bare else flight_loop(controller)
 
 
 def _controller(name, arguments, env, config):

@@ -14,6 +14,15 @@ import jax.numpy as jnp
 from attjax.dynamics import vectors
 from attjax.dynamics.vectors import Matrix, Vector
 
+EARTH_RADIUS, EARTH_MU = 6.371e6, 3.986004418e14
+"""m, and m³/s²."""
+
+EARTH_DIPOLE, DIPOLE_TILT_DEG = 2.98e-5, 9.41
+"""T above the equator at the mean radius, and degrees from the axis: IGRF-13 of 2020, degree 1."""
+
+SOLAR_PRESSURE = 4.54e-6
+"""N/m² at 1 au, on a surface that absorbs all."""
+
 EARTH_RATE = 7.292115e-5
 """Of the Earth against the stars, rad/s."""
 

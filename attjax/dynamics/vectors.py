@@ -7,10 +7,12 @@ import operator
 from typing import Any, TypeAlias, TypeVar
 
 import jax
+import jax.numpy as jnp
 
 Tree = TypeVar("Tree")
 Vector: TypeAlias = tuple[Any, Any, Any]
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
+Quaternion: TypeAlias = tuple[Any, Any, Any, Any]
 
 
 def add(tree: Tree, other: Tree) -> Tree:
@@ -96,3 +98,33 @@ def attitude_matrix(quaternion: tuple) -> Matrix:
         (2 * (q1 * q2 - qs * q3), 1 - 2 * (q1 * q1 + q3 * q3), 2 * (q2 * q3 + qs * q1)),
         (2 * (q1 * q3 + qs * q2), 2 * (q2 * q3 - qs * q1), 1 - 2 * (q1 * q1 + q2 * q2)),
     )
+
+
+def then(quaternion: Quaternion, turn: Quaternion) -> Quaternion:
+    """The attitude after a further turn of the body: the product q ⊗ t, scalar last.
+
+    Example:
+        >>> then((0, 0, 1, 0), (0, 0, 1, 0))   # half a turn twice
+        (0, 0, 0, -1)
+    """
+    v, t = quaternion[:3], turn[:3]
+    vector = add(add(scaled(quaternion[3], t), scaled(turn[3], v)), cross(v, t))
+    return *vector, quaternion[3] * turn[3] - dot(v, t)
+
+
+def conjugate(quaternion: Quaternion) -> Quaternion:
+    """The opposite turn."""
+    q1, q2, q3, qs = quaternion
+    return -q1, -q2, -q3, qs
+
+
+def normalized(quaternion: Quaternion) -> Quaternion:
+    """The quaternion at unit length."""
+    q1, q2, q3, qs = quaternion
+    factor = 1 / jnp.sqrt(q1 * q1 + q2 * q2 + q3 * q3 + qs * qs)
+    return q1 * factor, q2 * factor, q3 * factor, qs * factor
+
+
+def chosen(condition: Any, tree: Tree, other: Tree) -> Tree:
+    """One of two trees, leaf by leaf."""
+    return jax.tree.map(lambda x, y: jnp.where(condition, x, y), tree, other)

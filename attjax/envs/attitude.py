@@ -10,11 +10,12 @@ import numpy as np
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
 from attjax.dynamics.fused_loop import apart
+from attjax.dynamics.integration import AgentStep
 from attjax.dynamics.numerics import squared_norm
 from attjax.envs import initial_state, parameters, simulator, spaces, torques, worlds
 from attjax.envs import observation as observations
-from attjax.envs.context import Context
-from attjax.envs.keys import observation_key, steps_key, world_key
+from attjax.envs.context import Context, believed
+from attjax.envs.keys import observation_key, steps_key
 from attjax.envs.parameters import EnvParams, EnvState
 from attjax.envs.restart import restart_one
 from attjax.envs.reward import Transition, paper_reward
@@ -105,10 +106,9 @@ class AttitudeEnv:
 
     def context(self, params: EnvParams) -> Context:
         """What a controller may know of this environment."""
-        period = parameters.control_period(params, self.frameskip)
-        duration = period if params.torque_held else INTEGRATION_STEP
-        spacecraft = params.inertia, params.torque_table, params.rate_limit
-        return Context(period, *spacecraft, duration, self.kinematic_factor, self._is_continuous)
+        agent_step = AgentStep(self.frameskip, params.torque_held, self.kinematic_factor)
+        told = self.observes_quaternion_rate, self._is_continuous
+        return believed(params, self.world, agent_step, *told)
 
     def reset(
         self, key: chex.PRNGKey, params: EnvParams | None = None
@@ -122,11 +122,7 @@ class AttitudeEnv:
         parameters.check_params(params, self.frameskip)
         start = self.initial_state(key, params)
         drawn_once = {x: apart(getattr(start, x)) for x in ("quaternion", "angular_velocity")}
-        state = start.replace(**drawn_once)
-        if not self.world.is_ideal:
-            axes = torques.torque_axes(params, self.spacecraft, self.actions)
-            drawn = params, state, axes, self.frameskip
-            state = state.replace(plant=worlds.drawn_plant(self.world, world_key(key), *drawn))
+        state = worlds.placed(self, key, start.replace(**drawn_once), params)
         return self.observe(observation_key(key), state, params), state
 
     reset_env = reset

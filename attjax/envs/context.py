@@ -4,7 +4,11 @@ import chex
 import jax.numpy as jnp
 from flax import struct
 
+from attjax.dynamics.integration import AgentStep
+from attjax.envs.knowledge import Knowledge, knowledge
+from attjax.envs.parameters import EnvParams, control_period
 from attjax.spacecraft import INTEGRATION_STEP
+from attjax.world import World
 
 
 @struct.dataclass
@@ -17,7 +21,11 @@ class Context:
         torque_table: (actions, 3) torque of each action, body frame, N m.
         rate_limit: largest admissible ‖ω‖, rad/s.
         torque_duration: how long a torque acts, from the beginning of a control period, s.
-        kinematic_factor: of the kinematics, ½ by Eq. 9; a Python float.
+        knowledge: of the world; by default the truth is told, and torques come at once.
+        steps_after: RK4 steps after the first in a control period, where those of one program
+            differ; None: those of ``agent_step``.
+        agent_step: what is known of a control period when it is compiled.
+        observes_quaternion_rate: whether Eq. 11's q̇ is observed; a Python bool.
         continuous: whether an action is (3,) fractions of the largest torque about each body axis
             instead of a row of the table; a Python bool.
     """
@@ -27,8 +35,16 @@ class Context:
     torque_table: chex.Array
     rate_limit: chex.Array
     torque_duration: chex.Numeric = INTEGRATION_STEP
-    kinematic_factor: float = struct.field(pytree_node=False, default=0.5)
+    knowledge: Knowledge = Knowledge()
+    steps_after: chex.Array | None = None
+    agent_step: AgentStep = struct.field(pytree_node=False, default=AgentStep(0))
+    observes_quaternion_rate: bool = struct.field(pytree_node=False, default=True)
     continuous: bool = struct.field(pytree_node=False, default=False)
+
+    @property
+    def kinematic_factor(self) -> float:
+        """Of the kinematics: ½ by Eq. 9."""
+        return self.agent_step.kinematic_factor
 
     @property
     def largest_torque(self) -> chex.Array:
@@ -39,3 +55,32 @@ class Context:
         """∫ω dt, rad, of a turn by ``angle`` about a fixed axis: by Eq. 9 the angle itself."""
         factor = self.kinematic_factor
         return angle if factor == 0.5 else angle / (2 * factor)
+
+
+def believed(
+    params: EnvParams,
+    world: World,
+    agent_step: AgentStep,
+    observes_quaternion_rate: bool,
+    continuous: bool,
+) -> Context:
+    """The context of a spacecraft in a world.
+
+    Args:
+        params: of the spacecraft, as believed.
+        world: that it flies in.
+        agent_step, observes_quaternion_rate, continuous: as of :class:`Context`.
+    """
+    period = control_period(params, agent_step.frameskip)
+    return Context(
+        control_period=period,
+        inertia=params.inertia,
+        torque_table=params.torque_table,
+        rate_limit=params.rate_limit,
+        torque_duration=period if params.torque_held else INTEGRATION_STEP,
+        knowledge=knowledge(world, params.inertia, period),
+        steps_after=params.frameskip,
+        agent_step=agent_step,
+        observes_quaternion_rate=observes_quaternion_rate,
+        continuous=continuous,
+    )

@@ -40,7 +40,8 @@ def drawn_sensing(
     return Sensing.begun((tracker, gyro), state, draws)
 
 
-def _clock(sensor):
+def clock_of(sensor: telling.Gyro | telling.StarTracker) -> Clock:
+    """When a sensor samples, and when it tells that."""
     if sensor.rate_hz is None:
         return Clock()
     latency = getattr(sensor, "latency", 0.0)
@@ -53,12 +54,12 @@ def _tracker(tracker, draws):
         ARCSEC * draws.number(f"star_tracker.{x}", getattr(tracker, x))
         for x in ("cross_boresight_arcsec", "roll_arcsec")
     )
-    return StarTracker(across, about, tracker.boresight, tracker.most_rate, _clock(tracker))
+    return StarTracker(across, about, tracker.boresight, tracker.most_rate, clock_of(tracker))
 
 
 def _gyro(gyro, draws, period):
     """Its errors; what is exactly 0 is left out."""
-    clock = _clock(gyro)
+    clock = clock_of(gyro)
     interval = clock.period * INTEGRATION_STEP if clock.period else period
     walk, bias, instability = (
         None if x == 0 else factor * draws.number(f"gyro.{name}", x)

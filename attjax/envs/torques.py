@@ -6,17 +6,18 @@ import numpy as np
 
 from attjax import checks
 from attjax.dynamics.actuators import Commands
+from attjax.envs.context import Context
 from attjax.envs.parameters import EnvParams, EnvState, control_period
 from attjax.spacecraft import INTEGRATION_STEP, Spacecraft
 
 
-def applied_torque(action: chex.Numeric, params: EnvParams) -> chex.Array:
+def applied_torque(action: chex.Numeric, params: EnvParams | Context) -> chex.Array:
     """The torque that an action stands for.
 
     Args:
         action: integer scalar, row of the torque table (Table 1); or (3,) real, fractions of
             :func:`largest_torques`, clipped to [−1, 1].
-        params: of the spacecraft.
+        params: of the spacecraft, or the context, with its torque table.
 
     Returns:
         (3,) torque, body frame, N m, for as long as the environment's context says.

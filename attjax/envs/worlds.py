@@ -11,23 +11,40 @@ import numpy as np
 from attjax.dynamics import numerics
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics.actuators import Actuators, empty_queue
-from attjax.dynamics.disturbances import Disturbances, EarthDipole, Orbit
+from attjax.dynamics.disturbances import (
+    DIPOLE_TILT_DEG,
+    EARTH_DIPOLE,
+    EARTH_MU,
+    EARTH_RADIUS,
+    SOLAR_PRESSURE,
+    Disturbances,
+    EarthDipole,
+    Orbit,
+)
 from attjax.dynamics.draws import Draws
 from attjax.dynamics.sensing import Seen
 from attjax.envs.inertia import drawn_inertia
+from attjax.envs.keys import world_key
 from attjax.envs.parameters import EnvParams, EnvState, control_period
 from attjax.envs.plant import Plant
 from attjax.envs.sensors import drawn_sensing
+from attjax.envs.torques import torque_axes
 from attjax.world import World
 
-EARTH_RADIUS, EARTH_MU = 6.371e6, 3.986004418e14
-"""m, and m³/s²."""
 
-EARTH_DIPOLE, DIPOLE_TILT_DEG = 2.98e-5, 9.41
-"""T above the equator at the mean radius, and degrees from the axis: IGRF-13 of 2020, degree 1."""
+def placed(env: Any, key: chex.PRNGKey, state: EnvState, params: EnvParams) -> EnvState:
+    """A state at an episode's start in the environment's world: with a plant, unless it is ideal.
 
-SOLAR_PRESSURE = 4.54e-6
-"""N/m² at 1 au, on a surface that absorbs all."""
+    Args:
+        env: an :class:`attjax.AttitudeEnv`.
+        key: of the episode's reset.
+        state, params: at its start.
+    """
+    if env.world.is_ideal:
+        return state
+    axes = torque_axes(params, env.spacecraft, env.actions)
+    key = world_key(key)
+    return state.replace(plant=drawn_plant(env.world, key, params, state, axes, env.frameskip))
 
 
 def drawn_plant(

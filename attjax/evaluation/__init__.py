@@ -1,6 +1,8 @@
 """Judging controllers: episodes, statistics, the paper's tables, figures, playback."""
 
-from attjax.evaluation.episodes import Controller, Episodes, History, fly, random_slews, record
+from attjax.evaluation.episodes import Episodes, Holding, fly, random_slews
+from attjax.evaluation.flown import Controller
+from attjax.evaluation.history import History, record
 from attjax.evaluation.summary import (
     STATISTICS,
     conditions,
@@ -16,6 +18,7 @@ __all__ = [
     "Controller",
     "Episodes",
     "History",
+    "Holding",
     "conditions",
     "evaluate",
     "fly",

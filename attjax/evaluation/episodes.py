@@ -1,5 +1,6 @@
-"""A controller over many slews: what comes of each, or every step of them."""
+"""A controller over many slews: what comes of each."""
 
+import dataclasses
 import functools
 import math
 from collections.abc import Callable
@@ -14,21 +15,37 @@ from attjax import sharding
 from attjax.dynamics import numerics
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
-from attjax.envs.context import Context
-from attjax.envs.keys import observation_key, steps_key
+from attjax.envs.keys import steps_key
 from attjax.envs.parameters import EnvParams, EnvState
+from attjax.evaluation import flown as flying
+from attjax.evaluation.flown import Controller
 from attjax.sharding import SHARED, SPLIT
 from attjax.values import integer
-
-Controller = Callable[[chex.Array, Context], chex.Array]
-"""``act(observation (11,), context) -> action``; a pytree, e.g. ``jax.tree_util.Partial``."""
-
 
 SLEWS_TOGETHER = 512
 """Most slews of a block on CPU, whose states and hidden layers of 64 fit the cache of a core."""
 
 SLEWS_A_CALL = 2**14
 """About the most slews between two calls of a progress."""
+
+
+HOLDING_SHARE = 5
+"""The last fifth of an episode shows how well a controller holds its target."""
+
+
+@struct.dataclass
+class Holding:
+    """The last fifth of each episode; fields are (episodes,).
+
+    Attributes:
+        squared: mean of φ², rad².
+        most: largest φ, rad.
+        estimate_squared: mean of the squared angle between what was believed and the truth, rad².
+    """
+
+    squared: chex.Array
+    most: chex.Array
+    estimate_squared: chex.Array
 
 
 @struct.dataclass
@@ -42,6 +59,7 @@ class Episodes:
         last_outside: last step, counted from 1, with φ above the goal angle; 0 if none.
         score: return of Eq. 12–13.
         impulse: sum of the torque magnitudes times their duration, N m s.
+        holding: None unless it was asked for.
     """
 
     closest_angle: chex.Array
@@ -52,21 +70,7 @@ class Episodes:
     last_outside: chex.Array
     score: chex.Array
     impulse: chex.Array
-
-
-@struct.dataclass
-class History:
-    """Every agent step of some slews; fields are (steps, slews, ...), after each step.
-
-    Attributes:
-        quaternion: (..., 4) error quaternion.
-        angular_velocity: (..., 3) rad/s.
-        torque: (..., 3) torque of the action that led there, N m.
-    """
-
-    quaternion: chex.Array
-    angular_velocity: chex.Array
-    torque: chex.Array
+    holding: Holding | None = None
 
 
 def random_slews(
@@ -83,6 +87,7 @@ def fly(
     key: chex.PRNGKey,
     episodes: int,
     progress: Callable[[int], None] | None = None,
+    judges_holding: bool = False,
 ) -> Episodes:
     """Fly ``episodes`` random slews of ``params.max_steps_in_episode`` steps each.
 
@@ -95,6 +100,7 @@ def fly(
         key: of the slews of :func:`random_slews`.
         episodes: how many.
         progress: called now and then with how many have flown.
+        judges_holding: whether to look at the last fifth of each, too.
 
     Raises:
         ValueError: there are none.
@@ -108,7 +114,8 @@ def fly(
     for start in range(0, episodes, a_call):
         rows = np.arange(start, start + a_call) % episodes  # to fill the last
         part = keys[rows].reshape(num_devices * blocks, size)
-        flown.append(jax.device_get(fly_blocks(controller, env, params, part, num_devices)))
+        block = fly_blocks(controller, env, params, part, num_devices, judges_holding)
+        flown.append(jax.device_get(block))
         if progress is not None:
             progress(min(start + a_call, episodes))
     return jax.tree.map(lambda *x: np.concatenate(x).reshape(-1)[:episodes], *flown)
@@ -125,7 +132,9 @@ def _shape_of_call(slews):
 
 
 @functools.partial(
-    jax.jit, static_argnames=("env", "num_devices"), compiler_options=sharding.COMPILER_OPTIONS
+    jax.jit,
+    static_argnames=("env", "num_devices", "judges_holding"),
+    compiler_options=sharding.COMPILER_OPTIONS,
 )
 def fly_blocks(
     controller: Controller,
@@ -133,12 +142,14 @@ def fly_blocks(
     params: EnvParams,
     keys: chex.PRNGKey,
     num_devices: int = 1,
+    judges_holding: bool = False,
 ) -> Episodes:
     """Fly the slews of (blocks, slews) keys; the devices share the blocks. For :func:`fly`."""
+    fly_block = functools.partial(_fly_block, env, judges_holding)
     on_device = sharding.on_devices(
         num_devices,
         lambda controller, params, keys: jax.lax.map(
-            lambda block: _fly_block(controller, env, params, block), keys
+            lambda block: fly_block(controller, params, block), keys
         ),
         (SHARED, SHARED, SPLIT),
         SPLIT,
@@ -146,29 +157,43 @@ def fly_blocks(
     return on_device(controller, params, keys)
 
 
-def _fly_block(controller, env, params, reset_keys):
+def _fly_block(env, judges_holding, controller, params, reset_keys):
     observation, state = jax.vmap(env.reset, (0, None))(reset_keys, params)
     keys, context = jax.vmap(steps_key)(reset_keys), env.context(params)
+    memory = flying.first_memory(controller, context, len(reset_keys))
 
     def step(index, carry):
-        observation, state, so_far, excess = carry
-        results = _step(controller, env, params, keys, index, observation, state)
+        observation, state, memory, so_far, excess = carry
+        memory, results = flying.step(
+            controller, env, params, (keys, index), (memory, observation, state)
+        )
         updated, excess = _updated(so_far, excess, index + 1, results, context, params)
+        if judges_holding:
+            error = flying.estimation_error(memory, state)
+            holding = _held(so_far.holding, updated.terminal_angle, error, index, params)
+            updated = dataclasses.replace(updated, holding=holding)
         ended = so_far.overspeed
         so_far = jax.tree.map(lambda old, new: jnp.where(ended, old, new), so_far, updated)
-        return *results[:2], so_far, excess
+        return *results[:2], memory, so_far, excess
 
     zero = jnp.zeros(len(reset_keys), observation.dtype)
     start = Episodes(zero + jnp.inf, zero, zero, zero, zero > 0, zero.astype(jnp.int32), zero, zero)
+    if judges_holding:
+        start = dataclasses.replace(start, holding=Holding(zero, zero, zero))
     steps = params.max_steps_in_episode
-    return jax.lax.fori_loop(0, steps, step, (observation, state, start, zero))[2]
+    return jax.lax.fori_loop(0, steps, step, (observation, state, memory, start, zero))[3]
 
 
-def _step(controller, env, params, keys, index, observation, state):
-    """What ``step_env`` returns of all slews under the controller, each with a key of its own."""
-    action = jax.vmap(controller, (0, None))(observation, env.context(params))
-    keys = jax.vmap(jax.random.fold_in, (0, None))(keys, index)
-    return jax.vmap(env.step_env, (0, 0, 0, None))(keys, state, action, params)
+def _held(holding, angle, error, index, params):
+    """What is known of the last fifth after a step, were no episode ended."""
+    steps = params.max_steps_in_episode
+    first = steps - jnp.maximum(steps // HOLDING_SHARE, 1)
+    share = jnp.where(index >= first, 1 / (steps - first), 0).astype(angle.dtype)
+    return Holding(
+        squared=holding.squared + share * angle**2,
+        most=jnp.where(index >= first, jnp.maximum(holding.most, angle), holding.most),
+        estimate_squared=holding.estimate_squared + share * error**2,
+    )
 
 
 def _updated(so_far, excess, number, results, context, params):
@@ -190,29 +215,3 @@ def _updated(so_far, excess, number, results, context, params):
         impulse=impulse,
     )
     return updated, excess
-
-
-@functools.partial(jax.jit, static_argnames=("env", "steps"))
-def record(
-    controller: Controller,
-    env: AttitudeEnv,
-    params: EnvParams,
-    key: chex.PRNGKey,
-    start: EnvState,
-    steps: int,
-) -> History:
-    """Fly slews from a batch of states without ending them early, and keep every step.
-
-    Of slews of :func:`random_slews`, and with the same key, they are the flights of :func:`fly`.
-    """
-    slews = len(start.time)
-    first = jax.vmap(lambda key, state: env.observe(observation_key(key), state, params))
-    observation = first(jax.random.split(key, slews), start)
-    keys = jax.vmap(steps_key)(jax.random.split(key, slews))
-
-    def step(carry, index):
-        observation, state, _, _, info = _step(controller, env, params, keys, index, *carry)
-        history = History(state.quaternion, state.angular_velocity, info["torque"])
-        return (observation, state), history
-
-    return jax.lax.scan(step, (observation, start), jnp.arange(steps))[1]

@@ -14,7 +14,9 @@ from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.parameters import EnvParams, EnvState
 from attjax.evaluation import paper
-from attjax.evaluation.episodes import Controller, Episodes, History
+from attjax.evaluation.episodes import Episodes
+from attjax.evaluation.flown import Controller
+from attjax.evaluation.history import History
 from attjax.evaluation.paper import PAPER_TABLE_2, is_the_papers
 
 STYLES = ("-", "--", "-.", ":")

@@ -5,9 +5,11 @@ from collections.abc import Callable
 import jax
 import numpy as np
 
+from attjax.control.flight_loop import FlightLoop
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.parameters import EnvParams
-from attjax.evaluation.episodes import Controller, Episodes, fly
+from attjax.evaluation.episodes import Episodes, fly
+from attjax.evaluation.flown import Controller
 from attjax.values import integer
 
 STATISTICS = ("mean", "std", "min", "q1", "q2", "q3", "max")
@@ -25,7 +27,8 @@ def evaluate(
 
     Args:
         controller: ``act(observation, context) -> action``: a policy of ``attjax.load_policy``
-            or of ``attjax.train(...)``, a classical law, any function of one's own.
+            or of ``attjax.train(...)``, a classical law, any function of one's own, told what the
+            sensors say; or one in a flight loop (:func:`attjax.flight_loop`), told an estimate.
         env: what flies, and its control rate; by default LM50 at 40 Hz, as in Table 2.
         episodes: number of slews.
         seed: of their starts.
@@ -44,7 +47,9 @@ def evaluate(
     """
     env = AttitudeEnv(frameskip=5) if env is None else env
     params, key = env.default_params, jax.random.key(seed)
-    flown = fly(jax.tree_util.Partial(controller), env, params, key, episodes, progress)
+    if not isinstance(controller, FlightLoop):
+        controller = jax.tree_util.Partial(controller)
+    flown = fly(controller, env, params, key, episodes, progress)
     return conditions(env, params, seed, episodes) | statistics(flown, env, params)
 
 

@@ -31,6 +31,12 @@ class Uniform:
         """The least and the largest that it can be."""
         return self.low, self.high
 
+    @property
+    def moments(self) -> tuple[float, float]:
+        """The means of it and of its square."""
+        a, b = self.low, self.high
+        return (a + b) / 2, (a * a + a * b + b * b) / 3
+
 
 @dataclasses.dataclass(frozen=True)
 class LogUniform(Uniform):
@@ -42,6 +48,13 @@ class LogUniform(Uniform):
         super().__post_init__()
         if self.low <= 0:
             raise ValueError(f"log_uniform is {shown((self.low, self.high))}; low must be above 0")
+
+    @property
+    def moments(self) -> tuple[float, float]:
+        """The means of it and of its square."""
+        a, b = self.low, self.high
+        decades = math.log(b / a)
+        return (a, a * a) if a == b else ((b - a) / decades, (b * b - a * a) / (2 * decades))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,6 +94,26 @@ class Normal:
     def support(self) -> tuple[float, float]:
         """The least and the largest that it can be."""
         return self.low, self.high
+
+    @property
+    def moments(self) -> tuple[float, float]:
+        """The means of it and of its square.
+
+        Example:
+            >>> mean, square = Normal(1.0, 0.1, low=0.9, high=1.1).moments
+            >>> round(mean, 6), round((square - mean**2) ** 0.5, 6)
+            (1.0, 0.053956)
+        """
+        mean, deviation = self.mean, self.deviation
+        if math.isinf(self.low):
+            return mean, mean**2 + deviation**2
+        ends = [(x - mean) / deviation for x in self.support]
+        heights = [math.exp(-(x**2) / 2) / math.sqrt(2 * math.pi) for x in ends]
+        share = (math.erf(ends[1] / 2**0.5) - math.erf(ends[0] / 2**0.5)) / 2
+        slope = (heights[0] - heights[1]) / share
+        bend = (ends[0] * heights[0] - ends[1] * heights[1]) / share
+        cut_mean = mean + deviation * slope
+        return cut_mean, cut_mean**2 + deviation**2 * (1 + bend - slope**2)
 
 
 MOST_DEVIATIONS = 4
@@ -165,3 +198,8 @@ def check(name: str, number: Number, low: float, high: float) -> None:
 def largest(number: Number) -> float:
     """The most that it can be."""
     return number.support[1] if isinstance(number, Uniform | Normal) else number
+
+
+def moments(number: Number) -> tuple[float, float]:
+    """The means of it and of its square."""
+    return number.moments if isinstance(number, Uniform | Normal) else (number, number**2)

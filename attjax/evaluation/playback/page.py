@@ -14,7 +14,7 @@ from attjax.dynamics import quaternion as quaternions
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.parameters import EnvParams, EnvState
 from attjax.evaluation import paper
-from attjax.evaluation.episodes import Controller
+from attjax.evaluation.flown import Controller
 from attjax.values import integer
 
 RANDOM_SLEWS = 4

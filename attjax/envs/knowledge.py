@@ -1,0 +1,220 @@
+"""What those who fly in a world may know of it: how wrong things can be, not what they are.
+
+All of it follows from the world's description: a flight loop has no numbers set by hand.
+"""
+
+import math
+
+import chex
+import jax.numpy as jnp
+from flax import struct
+
+from attjax.dynamics.clock import Clock
+from attjax.dynamics.disturbances import EARTH_DIPOLE, EARTH_MU, EARTH_RADIUS, SOLAR_PRESSURE
+from attjax.envs.sensors import ALLAN_TOP, ARCSEC, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, PPM, clock_of
+from attjax.spacecraft import INTEGRATION_STEP
+from attjax.world import World
+from attjax.world.distributions import moments
+
+
+class AttitudeNoise(struct.PyTreeNode):
+    """Of a star tracker's samples.
+
+    Attributes:
+        across, about: standard deviations across the boresight and about it, rad.
+        boresight: direction, body frame; known when it is compiled.
+        clock: of the samples.
+    """
+
+    across: chex.Numeric
+    about: chex.Numeric
+    boresight: tuple[float, ...] = struct.field(pytree_node=False)
+    clock: Clock = struct.field(pytree_node=False)
+
+
+class RateNoise(struct.PyTreeNode):
+    """Of a gyro's samples.
+
+    Attributes:
+        sample: standard deviation of a sample about each axis, rad/s.
+        along, across: of its error's share in the rate about the axis, and about the others.
+        bias: of what is always the same at an episode's start, rad/s; None: it has no bias.
+        walk: of what it changes by, rad/s in √s.
+        limit: rad/s; a sample of it says nothing.
+        clock: of the samples.
+    """
+
+    sample: chex.Numeric
+    along: chex.Numeric
+    across: chex.Numeric
+    bias: chex.Numeric | None
+    walk: chex.Numeric
+    limit: float | None = struct.field(pytree_node=False)
+    clock: Clock = struct.field(pytree_node=False)
+
+
+class TorqueNoise(struct.PyTreeNode):
+    """Of the disturbances together.
+
+    Attributes:
+        variance: about each axis, N² m².
+        walk_per_radian: what it changes by as the body turns, N² m² rad⁻¹.
+        walk: what it changes by as time passes, N² m² s⁻¹.
+    """
+
+    variance: chex.Numeric
+    walk_per_radian: chex.Numeric
+    walk: chex.Numeric
+
+
+class Knowledge(struct.PyTreeNode):
+    """What is known of a world; by default that of one where the truth is told at once.
+
+    Attributes:
+        attitude: None: the true attitude is told.
+        rate: None: the true rate is told.
+        torque: None: nothing disturbs.
+        along, across: standard deviations of a torque, as shares of it.
+        inertia: of a moment of inertia, as a share of it.
+        delay: from a command to its torque, RK4 steps; known when it is compiled.
+    """
+
+    attitude: AttitudeNoise | None = None
+    rate: RateNoise | None = None
+    torque: TorqueNoise | None = None
+    along: chex.Numeric = 0.0
+    across: chex.Numeric = 0.0
+    inertia: chex.Numeric = 0.0
+    delay: int = struct.field(pytree_node=False, default=0)
+
+    @property
+    def is_truth(self) -> bool:
+        """Whether there is nothing to estimate: the truth is told, and torques come at once."""
+        return self.attitude is None and self.rate is None and self.delay == 0
+
+
+def knowledge(world: World, inertia: chex.Array, period: chex.Numeric) -> Knowledge:
+    """What is known of a world; nothing of one where the truth is told and torques come at once.
+
+    Args:
+        world: its description.
+        inertia: as believed, (3,) or (3, 3), kg m².
+        period: time between two decisions, s.
+
+    Example:
+        >>> from attjax.world import Actuators
+        >>> late = World(actuators=Actuators(delay=6, gain=1.1))
+        >>> known = knowledge(late, jnp.array([0.872, 0.115, 0.797]), 1 / 40)
+        >>> known.delay, round(known.along, 6)
+        (6, 0.1)
+    """
+    sensors = world.sensors
+    tracker, gyro = (sensors.star_tracker, sensors.gyro) if sensors else (None, None)
+    delay = _delay(world.actuators)
+    if tracker is None and gyro is None and delay == 0:
+        return Knowledge()
+    inertia_error = _inertia_error(world.uncertainty)
+    along, across = _torque_errors(world.actuators)
+    return Knowledge(
+        attitude=None if tracker is None else _attitude_noise(tracker),
+        rate=None if gyro is None else _rate_noise(gyro, period),
+        torque=_torque_noise(world, inertia),
+        along=math.hypot(along, inertia_error),
+        across=across,
+        inertia=inertia_error,
+        delay=delay,
+    )
+
+
+def _root_mean_square(number):
+    return math.sqrt(moments(number)[1])
+
+
+def _deviation_from_one(number):
+    mean, square = moments(number)
+    return math.sqrt(max(square - 2 * mean + 1, 0))
+
+
+def _delay(actuators):
+    if actuators is None:
+        return 0
+    return round(moments(actuators.delay)[0] + moments(actuators.delay_jitter)[0])
+
+
+def _torque_errors(actuators):
+    if actuators is None:
+        return 0.0, 0.0
+    angle = math.radians(_root_mean_square(actuators.misalignment_deg))
+    return _deviation_from_one(actuators.gain), angle / 2**0.5
+
+
+def _inertia_error(uncertainty):
+    if uncertainty is None:
+        return 0.0
+    factors = uncertainty.inertia_factor, uncertainty.moment_factor
+    turned = math.radians(_root_mean_square(uncertainty.axes_turned_deg))
+    return math.hypot(*map(_deviation_from_one, factors), min(turned, 1))
+
+
+def _attitude_noise(tracker):
+    across, about = (
+        ARCSEC * _root_mean_square(x) for x in (tracker.cross_boresight_arcsec, tracker.roll_arcsec)
+    )
+    return AttitudeNoise(across, about, tracker.boresight, clock_of(tracker))
+
+
+def _rate_noise(gyro, period):
+    clock = clock_of(gyro)
+    interval = clock.period * INTEGRATION_STEP if clock.period else period
+    white = DEG_PER_ROOT_HOUR * _root_mean_square(gyro.angle_random_walk_deg_per_root_h)
+    fixed = DEG_PER_HOUR * _root_mean_square(gyro.bias_deg_per_h) / 3**0.5
+    wandering = DEG_PER_HOUR / ALLAN_TOP * _root_mean_square(gyro.bias_instability_deg_per_h)
+    has_bias = fixed > 0 or wandering > 0
+    return RateNoise(
+        sample=jnp.sqrt(white**2 / interval + gyro.resolution**2 / 12),
+        along=PPM * _root_mean_square(gyro.scale_factor_ppm),
+        across=ARCSEC * _root_mean_square(gyro.misalignment_arcsec) / 2**0.5,
+        bias=math.hypot(fixed, wandering) if has_bias else None,
+        walk=wandering * math.sqrt(2 / gyro.bias_correlation_time),
+        limit=gyro.rate_limit,
+        clock=clock,
+    )
+
+
+def _torque_noise(world, inertia):
+    """Of directions that are uniform, a torque a × f has ²⁄₉ a² f² about each axis."""
+    given = world.disturbances
+    if given is None or given == type(given)():
+        return None
+    fixed = moments(given.constant_torque)[1] / 3
+    turning, orbital_rate = 0.0, 0.0
+    if world.orbit is not None:
+        radius = EARTH_RADIUS + 1e3 * moments(world.orbit.altitude_km)[0]
+        orbital_rate = math.sqrt(EARTH_MU / radius) / radius
+        field = EARTH_DIPOLE * (EARTH_RADIUS / radius) ** 3
+        turning += 4 / 9 * moments(given.residual_dipole)[1] * field**2  # B² is 2 B₀² on average
+        if given.drag is not None:
+            speed = orbital_rate * radius
+            turning += 2 / 9 * (speed**2 / 2) ** 2 * _mean_square(given.drag, "density")
+        if given.gravity_gradient:
+            turning = turning + _gravity_gradient(orbital_rate, inertia)
+    if given.radiation_pressure is not None:
+        turning = turning + 2 / 9 * SOLAR_PRESSURE**2 * _mean_square(given.radiation_pressure)
+    swinging, swing = 0.0, 0.0
+    if given.sinusoid is not None:
+        swinging = moments(given.sinusoid.torque)[1] / 6
+        swing = 2 * math.pi / moments(given.sinusoid.period)[0]
+    walk = 2 * (turning * 2 * orbital_rate + swinging * swing)
+    return TorqueNoise(fixed + turning + swinging, 2 * turning, walk)
+
+
+def _mean_square(part, *more):
+    names = "area", "coefficient", "lever_arm", *more
+    return math.prod(moments(getattr(part, name))[1] for name in names)
+
+
+def _gravity_gradient(rate, inertia):
+    """Mean square about an axis of 3 n² r̂ × I r̂ for uniform r̂: n⁴ (3 tr I² − (tr I)²)/5."""
+    squared = jnp.sum(inertia**2)
+    trace = jnp.sum(inertia) if inertia.ndim == 1 else jnp.trace(inertia)
+    return rate**4 * (3 * squared - trace**2) / 5

@@ -1,0 +1,64 @@
+"""Every step of some slews under a controller."""
+
+import functools
+
+import chex
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+from attjax.envs.attitude import AttitudeEnv
+from attjax.envs.keys import observation_key, steps_key
+from attjax.envs.parameters import EnvParams, EnvState
+from attjax.envs.worlds import placed
+from attjax.evaluation import flown
+from attjax.evaluation.flown import Controller
+
+
+@struct.dataclass
+class History:
+    """Every agent step of some slews; fields are (steps, slews, ...), after each step.
+
+    Attributes:
+        quaternion: (..., 4) error quaternion.
+        angular_velocity: (..., 3) rad/s.
+        torque: (..., 3) torque of the action that led there, N m.
+        believed: (..., 4) attitude that was believed when it was decided on, so of before.
+    """
+
+    quaternion: chex.Array
+    angular_velocity: chex.Array
+    torque: chex.Array
+    believed: chex.Array
+
+
+@functools.partial(jax.jit, static_argnames=("env", "steps"))
+def record(
+    controller: Controller,
+    env: AttitudeEnv,
+    params: EnvParams,
+    key: chex.PRNGKey,
+    start: EnvState,
+    steps: int,
+) -> History:
+    """Fly slews from a batch of states without ending them early, and keep every step.
+
+    Of slews of :func:`random_slews`, and with the same key, they are the flights of :func:`fly`.
+    States that were put together without a world get one of the environment's.
+    """
+    reset_keys = jax.random.split(key, len(start.time))
+    if start.plant is None:
+        start = jax.vmap(placed, (None, 0, 0, None))(env, reset_keys, start, params)
+    first = jax.vmap(lambda key, state: env.observe(observation_key(key), state, params))
+    observation, keys = first(reset_keys, start), jax.vmap(steps_key)(reset_keys)
+    memory = flown.first_memory(controller, env.context(params), len(reset_keys))
+
+    def step(carry, index):
+        _, _, state = carry
+        memory, results = flown.step(controller, env, params, (keys, index), carry)
+        believed = flown.estimated(memory, state)
+        observation, state, _, _, info = results
+        history = History(state.quaternion, state.angular_velocity, info["torque"], believed)
+        return (memory, observation, state), history
+
+    return jax.lax.scan(step, (memory, observation, start), jnp.arange(steps))[1]
