@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from attjax import destinations, devices, errors
-from attjax.commands import evaluation_output, evaluation_subject
+from attjax.commands import evaluation_output, evaluation_subject, robustness
 from attjax.commands.evaluation_subject import POLICY
 from attjax.config import command_line, fields
 from attjax.spacecraft import MOST_DURATION
@@ -26,6 +26,7 @@ examples:
   python eval.py --checkpoint ckpt/ --json - | python -m json.tool
   python eval.py --checkpoint ckpt/ --playback slews.html
   python eval.py --controller phase-plane           needs no checkpoint
+  python eval.py --checkpoint ckpt/ --robustness    in worlds that are not perfect
 """
 
 
@@ -51,6 +52,11 @@ def _add_who(group):
     compare_help = "policy, classical controllers and the paper side by side, on the same slews"
     who.add_argument("--compare", action="store_true", help=compare_help)
     sampled_help = "let the policy draw its actions as in training, not take the most probable"
+    robustness_help = (
+        "the same three through a ladder of conditions: inertia, torques, sensors and delays that "
+        "are not as believed, and each named world"
+    )
+    who.add_argument("--robustness", action="store_true", help=robustness_help)
     group.add_argument("--sampled", action="store_true", help=sampled_help)
     bare_help = (
         "tell the controllers what the sensors say; otherwise an estimator filters it, and a "
@@ -65,9 +71,8 @@ def _add_who(group):
 
 
 def _add_conditions(group):
-    command_line.add_number(
-        group, "episodes", int, 5000, "number of random slews", low=1, high=10**7
-    )
+    episodes_help = "number of random slews (default: 5000; with --robustness 1000 a condition)"
+    command_line.add_number(group, "episodes", int, None, episodes_help, low=1, high=10**7)
     command_line.add_frameskip(
         group, "RK4 steps of 1/240 s after the first of a decision, for 240/(N + 1) Hz"
     )
@@ -102,7 +107,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     advice = "fewer --episodes take less"
     with errors.one_line_errors(), errors.enough_memory(advice):
         devices.select_device(arguments.device)
-        names = (POLICY, *CLASSICAL) if arguments.compare else (arguments.controller,)
+        is_alone = not (arguments.compare or arguments.robustness)
+        names = (arguments.controller,) if is_alone else (POLICY, *CLASSICAL)
+        evaluation_subject.complete(arguments)
         config = evaluation_subject.config(arguments, names)
         trained = config.settings.task.frameskips if config else None
         if arguments.frameskip is None:
@@ -124,6 +131,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             json_file, aside = sys.stdout, contextlib.redirect_stdout(sys.stderr)
         command_line.warn_of_untrained(arguments.frameskip, trained)
         with aside:
+            if arguments.robustness:
+                return robustness.judge(arguments, controllers, env, json_file)
             return _evaluate(arguments, controllers, env, plots, metrics, json_file)
 
 
@@ -182,7 +191,8 @@ def _flown(name, arguments, env, config):
     from attjax.control.flight_loop import flight_loop
 
     controller = _controller(name, arguments, env, config)
-    return controller if arguments.bare else flight_loop(controller)
+    is_plain = arguments.bare or arguments.robustness  # which flies each in both ways
+    return controller if is_plain else flight_loop(controller)
 
 
 def _controller(name, arguments, env, config):

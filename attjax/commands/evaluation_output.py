@@ -54,8 +54,12 @@ def prepare_playback(path: Path | None, steps: int) -> None:
 
 
 @contextlib.contextmanager
-def flying(name: str, slews: int) -> Iterator[Callable[[int], None]]:
+def flying(name: str, slews: int | None) -> Iterator[Callable[..., None]]:
     """Show on a terminal how many slews have flown, and when the others will have.
+
+    Args:
+        name: of what flies.
+        slews: how many; None: it is told with how many have.
 
     Yields:
         What is to be told how many have.
@@ -69,7 +73,7 @@ def flying(name: str, slews: int) -> Iterator[Callable[[int], None]]:
         if is_live:
             console.show_cursor(True)  # a process that is killed could not bring it back
         task = bar.add_task(name, total=slews)
-        yield lambda flown: bar.update(task, completed=flown)
+        yield lambda flown, total=slews: bar.update(task, completed=flown, total=total)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -82,7 +86,7 @@ def write_text(path: Path, text: str) -> None:
         destinations.write(path, text)
 
 
-def write_json(file: Path | TextIO, content: dict) -> None:
+def write_json(file: Path | TextIO, content: dict | list[dict]) -> None:
     """Write JSON into a path, or to a stream.
 
     Raises:

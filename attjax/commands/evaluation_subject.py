@@ -41,6 +41,21 @@ def config(arguments: argparse.Namespace, names: Collection[str]) -> run_config.
     return run
 
 
+def complete(arguments: argparse.Namespace) -> None:
+    """Fill in what depends on other flags.
+
+    Raises:
+        UserError: a flag does not go with ``--robustness``.
+    """
+    if arguments.episodes is None:
+        arguments.episodes = 1000 if arguments.robustness else 5000
+    if not arguments.robustness:
+        return
+    for flag in ("world", "bare", "sampled", "playback"):
+        if getattr(arguments, flag):
+            raise errors.UserError(f"--{flag} does not go with --robustness")
+
+
 def spacecraft(arguments: argparse.Namespace, config: run_config.Config | None) -> Spacecraft:
     """What flies, with the duration that was asked for.
 

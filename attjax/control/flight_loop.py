@@ -79,21 +79,37 @@ class FlightLoop(struct.PyTreeNode):
         Returns:
             The action, an integer scalar or (3,) fractions, and the memory after it.
         """
+        observation, memory = self.observed(memory, measurement, context)
+        action = self.controller(observation, context)
+        return action, self.after(memory, action, context)
+
+    def observed(
+        self, memory: Memory | None, measurement: Measurement, context: Context
+    ) -> tuple[chex.Array, Memory | None]:
+        """The observation (11,) that the controller is given, and the memory with the estimate.
+
+        It is of the moment at which the torque begins that the controller is about to command.
+
+        Args:
+            memory, measurement, context: as of :meth:`step`.
+        """
+        state: Any = measurement
+        if memory is not None:
+            memory = _estimated(memory, measurement, context)
+            state = memory.estimate
+            if context.knowledge.delay:
+                state = belief.after_delay(state, memory.queue, context)
+        quaternion, rate = jnp.stack(state.quaternion), jnp.stack(state.angular_velocity)
+        rules = context.kinematic_factor, context.observes_quaternion_rate
+        return observations.observe(quaternion, rate, *rules), memory
+
+    def after(self, memory: Memory | None, action: chex.Array, context: Context) -> Memory | None:
+        """The memory after an action; memory, action and context as of :meth:`step`."""
         if memory is None:
-            told = measurement.quaternion, measurement.angular_velocity
-            return self._act(*told, context), None
-        memory = _estimated(memory, measurement, context)
-        state: Any = memory.estimate
-        if context.knowledge.delay:
-            state = belief.after_delay(state, memory.queue, context)
-        action = self._act(jnp.stack(state.quaternion), jnp.stack(state.angular_velocity), context)
+            return None
         torque = applied_torque(action, context)
         queue = memory.queue.and_then(context.knowledge.delay, torque)
-        return action, memory.replace(queue=queue, time=memory.time + 1)
-
-    def _act(self, quaternion, angular_velocity, context):
-        rules = context.kinematic_factor, context.observes_quaternion_rate
-        return self.controller(observations.observe(quaternion, angular_velocity, *rules), context)
+        return memory.replace(queue=queue, time=memory.time + 1)
 
 
 def _estimated(memory, measurement, context):

@@ -18,7 +18,7 @@ from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.keys import steps_key
 from attjax.envs.parameters import EnvParams, EnvState
 from attjax.evaluation import flown as flying
-from attjax.evaluation.flown import Controller
+from attjax.evaluation.flown import Controller, Crew
 from attjax.sharding import SHARED, SPLIT
 from attjax.values import integer
 
@@ -87,7 +87,6 @@ def fly(
     key: chex.PRNGKey,
     episodes: int,
     progress: Callable[[int], None] | None = None,
-    judges_holding: bool = False,
 ) -> Episodes:
     """Fly ``episodes`` random slews of ``params.max_steps_in_episode`` steps each.
 
@@ -100,34 +99,61 @@ def fly(
         key: of the slews of :func:`random_slews`.
         episodes: how many.
         progress: called now and then with how many have flown.
-        judges_holding: whether to look at the last fifth of each, too.
 
     Raises:
         ValueError: there are none.
     """
+    return _fly((controller,), env, params, key, (episodes, False, progress))
+
+
+def fly_side_by_side(
+    controllers: Crew, env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, episodes: int
+) -> list[Episodes]:
+    """What comes of the same slews under each of several controllers, with how they hold.
+
+    They are compiled together, which takes less time than one by one.
+
+    Args:
+        controllers: flight loops first.
+        env, params, key, episodes: as of :func:`fly`.
+
+    Raises:
+        ValueError: there are no episodes.
+    """
+    flown = _fly(controllers, env, params, key, (episodes, True, None))
+    return [
+        jax.tree.map(lambda x, n=n: x[n :: len(controllers)], flown)
+        for n in range(len(controllers))
+    ]
+
+
+def _fly(controllers, env, params, key, how):
+    """The slews of each controller, one slew after the other."""
+    episodes, judges_holding, progress = how
     if (integer(episodes) or 0) < 1:
         raise ValueError(f"episodes is {episodes!r}; it must be an integer at least 1")
     keys = jax.random.split(key, episodes)
     calls = math.ceil(episodes / SLEWS_A_CALL)
-    num_devices, blocks, size = _shape_of_call(math.ceil(episodes / calls))
+    num_devices, blocks, size = _shape_of_call(math.ceil(episodes / calls), len(controllers))
     a_call, flown = num_devices * blocks * size, []
     for start in range(0, episodes, a_call):
         rows = np.arange(start, start + a_call) % episodes  # to fill the last
         part = keys[rows].reshape(num_devices * blocks, size)
-        block = fly_blocks(controller, env, params, part, num_devices, judges_holding)
+        block = fly_blocks(controllers, env, params, part, num_devices, judges_holding)
         flown.append(jax.device_get(block))
         if progress is not None:
             progress(min(start + a_call, episodes))
-    return jax.tree.map(lambda *x: np.concatenate(x).reshape(-1)[:episodes], *flown)
+    slews = episodes * len(controllers)
+    return jax.tree.map(lambda *x: np.concatenate(x).reshape(-1)[:slews], *flown)
 
 
-def _shape_of_call(slews):
+def _shape_of_call(slews, controllers):
     """Devices, blocks of each and slews of a block, of a call that flies at least so many."""
-    devices = sharding.devices()
+    devices, together = sharding.devices(), max(1, SLEWS_TOGETHER // controllers)
     if devices[0].platform != "cpu":
         return 1, 1, slews
-    num_devices = min(len(devices), math.ceil(slews / SLEWS_TOGETHER))
-    blocks = math.ceil(slews / (num_devices * SLEWS_TOGETHER))
+    num_devices = min(len(devices), math.ceil(slews / together))
+    blocks = math.ceil(slews / (num_devices * together))
     return num_devices, blocks, math.ceil(slews / (num_devices * blocks))
 
 
@@ -137,7 +163,7 @@ def _shape_of_call(slews):
     compiler_options=sharding.COMPILER_OPTIONS,
 )
 def fly_blocks(
-    controller: Controller,
+    controllers: Crew,
     env: AttitudeEnv,
     params: EnvParams,
     keys: chex.PRNGKey,
@@ -148,40 +174,42 @@ def fly_blocks(
     fly_block = functools.partial(_fly_block, env, judges_holding)
     on_device = sharding.on_devices(
         num_devices,
-        lambda controller, params, keys: jax.lax.map(
-            lambda block: fly_block(controller, params, block), keys
+        lambda controllers, params, keys: jax.lax.map(
+            lambda block: fly_block(controllers, params, block), keys
         ),
         (SHARED, SHARED, SPLIT),
         SPLIT,
     )
-    return on_device(controller, params, keys)
+    return on_device(controllers, params, keys)
 
 
-def _fly_block(env, judges_holding, controller, params, reset_keys):
+def _fly_block(env, judges_holding, controllers, params, keys):
+    """Each controller's slews; the results have a row for each slew, and in it one for each."""
+    slews, count = len(keys), len(controllers)
+    reset_keys = jnp.concatenate([keys] * count)
     observation, state = jax.vmap(env.reset, (0, None))(reset_keys, params)
     keys, context = jax.vmap(steps_key)(reset_keys), env.context(params)
-    memory = flying.first_memory(controller, context, len(reset_keys))
+    memory = flying.first_memory(controllers, context, slews)
 
     def step(index, carry):
-        observation, state, memory, so_far, excess = carry
-        memory, results = flying.step(
-            controller, env, params, (keys, index), (memory, observation, state)
-        )
+        *before, so_far, excess = carry
+        memory, results = flying.step(controllers, env, params, (keys, index), before)
         updated, excess = _updated(so_far, excess, index + 1, results, context, params)
         if judges_holding:
-            error = flying.estimation_error(memory, state)
+            error = flying.estimation_error(memory, before[2])
             holding = _held(so_far.holding, updated.terminal_angle, error, index, params)
             updated = dataclasses.replace(updated, holding=holding)
         ended = so_far.overspeed
         so_far = jax.tree.map(lambda old, new: jnp.where(ended, old, new), so_far, updated)
-        return *results[:2], memory, so_far, excess
+        return memory, *results[:2], so_far, excess
 
-    zero = jnp.zeros(len(reset_keys), observation.dtype)
+    zero = jnp.zeros(slews * count, observation.dtype)
     start = Episodes(zero + jnp.inf, zero, zero, zero, zero > 0, zero.astype(jnp.int32), zero, zero)
     if judges_holding:
         start = dataclasses.replace(start, holding=Holding(zero, zero, zero))
     steps = params.max_steps_in_episode
-    return jax.lax.fori_loop(0, steps, step, (observation, state, memory, start, zero))[3]
+    flown = jax.lax.fori_loop(0, steps, step, (memory, observation, state, start, zero))[3]
+    return jax.tree.map(lambda x: x.reshape(count, slews).T, flown)
 
 
 def _held(holding, angle, error, index, params):

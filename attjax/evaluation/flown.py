@@ -20,38 +20,61 @@ Controller: TypeAlias = Callable[[chex.Array, Context], chex.Array] | FlightLoop
 Or one in a flight loop (:func:`attjax.flight_loop`), with an estimator and a predictor.
 """
 
+Crew: TypeAlias = tuple[Controller, ...]
+"""Controllers that fly the same slews side by side, flight loops first."""
 
-def first_memory(controller: Controller, context: Context, slews: int) -> Memory | None:
-    """Of each of some slews before their first decision; None where nothing is remembered."""
-    if not isinstance(controller, FlightLoop):
+
+def first_memory(controllers: Crew, context: Context, slews: int) -> Memory | None:
+    """Before the first decision, of so many slews a loop; None where nothing is remembered."""
+    loops = _loops(controllers)
+    if not loops:
         return None
-    memory = controller.init(context)
-    return jax.tree.map(lambda x: jnp.broadcast_to(x, (slews, *jnp.shape(x))), memory)
+    memory, count = loops[0].init(context), slews * len(loops)
+    return jax.tree.map(lambda x: jnp.broadcast_to(x, (count, *jnp.shape(x))), memory)
+
+
+def _loops(controllers):
+    return [x for x in controllers if isinstance(x, FlightLoop)]
 
 
 def decide(
-    controller: Controller, context: Context, memory: Memory | None, told: chex.Array, states: Any
+    controllers: Crew, context: Context, memory: Memory | None, told: chex.Array, states: Any
 ) -> tuple[chex.Array, Memory | None]:
     """The actions of all slews, and what is remembered after them.
 
     Args:
-        controller: of all of them.
+        controllers: flight loops first; each flies as many of the slews as the others.
         context: of all of them.
-        memory: before it.
+        memory: of the flight loops before it.
         told: (slews, 11) observations, as a controller without a loop is told.
-        states: of which a flight loop is told the measurements.
+        states: (slews,), of which a flight loop is told the measurements.
     """
-    if not isinstance(controller, FlightLoop):
-        return jax.vmap(controller, (0, None))(told, context), None
-    measurements = jax.vmap(measured)(states)
-    return jax.vmap(controller.step, (0, 0, None))(memory, measurements, context)
+    each, loops = len(told) // len(controllers), _loops(controllers)
+    looped = each * len(loops)
+    if loops:
+        of_loops = jax.tree.map(lambda x: x[:looped], states)
+        observed, memory = jax.vmap(loops[0].observed, (0, 0, None))(
+            memory, jax.vmap(measured)(of_loops), context
+        )
+        told = jnp.concatenate([observed, told[looped:]])
+    acting = [x.controller if isinstance(x, FlightLoop) else x for x in controllers]
+    actions = [
+        jax.vmap(act, (0, None))(told[n * each : (n + 1) * each], context)
+        for n, act in enumerate(acting)
+    ]
+    action = jnp.concatenate(actions)
+    if loops:
+        memory = jax.vmap(loops[0].after, (0, 0, None))(memory, action[:looped], context)
+    return action, memory
 
 
 def estimated(memory: Memory | None, states: EnvState) -> chex.Array:
     """(slews, 4) attitudes that are believed at a decision; without an estimate, what was told."""
+    told = jax.vmap(measured)(states).quaternion
     if memory is None:
-        return jax.vmap(measured)(states).quaternion
-    return jnp.stack(memory.estimate.quaternion, axis=-1)
+        return told
+    estimates = jnp.stack(memory.estimate.quaternion, axis=-1)
+    return jnp.concatenate([estimates, told[len(estimates) :]])
 
 
 def estimation_error(memory: Memory | None, states: EnvState) -> chex.Array:
@@ -65,7 +88,7 @@ def estimation_error(memory: Memory | None, states: EnvState) -> chex.Array:
 
 
 def step(
-    controller: Controller,
+    controllers: Crew,
     env: AttitudeEnv,
     params: EnvParams,
     moment: tuple[chex.PRNGKey, chex.Array],
@@ -74,7 +97,8 @@ def step(
     """One agent step of all slews.
 
     Args:
-        controller, env, params: as of :func:`attjax.evaluation.fly`.
+        controllers: as of :func:`decide`.
+        env, params: that they fly.
         moment: the slews' keys, from which each step's is folded in, and which step it is.
         before: memory, observations (slews, 11) and states.
 
@@ -82,6 +106,6 @@ def step(
         The memory, and what ``env.step_env`` returns of each slew.
     """
     (keys, index), (memory, observation, state) = moment, before
-    action, memory = decide(controller, env.context(params), memory, observation, state)
+    action, memory = decide(controllers, env.context(params), memory, observation, state)
     keys = jax.vmap(jax.random.fold_in, (0, None))(keys, index)
     return memory, jax.vmap(env.step_env, (0, 0, 0, None))(keys, state, action, params)

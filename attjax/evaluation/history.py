@@ -51,11 +51,11 @@ def record(
         start = jax.vmap(placed, (None, 0, 0, None))(env, reset_keys, start, params)
     first = jax.vmap(lambda key, state: env.observe(observation_key(key), state, params))
     observation, keys = first(reset_keys, start), jax.vmap(steps_key)(reset_keys)
-    memory = flown.first_memory(controller, env.context(params), len(reset_keys))
+    memory = flown.first_memory((controller,), env.context(params), len(reset_keys))
 
     def step(carry, index):
         _, _, state = carry
-        memory, results = flown.step(controller, env, params, (keys, index), carry)
+        memory, results = flown.step((controller,), env, params, (keys, index), carry)
         believed = flown.estimated(memory, state)
         observation, state, _, _, info = results
         history = History(state.quaternion, state.angular_velocity, info["torque"], believed)

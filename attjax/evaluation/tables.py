@@ -34,12 +34,12 @@ def print_report(result: dict, spacecraft: Spacecraft) -> None:
 
     The paper's statistics stand beside those of its spacecraft, LM50, in its world.
     """
-    console = _console()
-    console.print(f"{result['controller']}: {_conditions(result, spacecraft)}\n")
-    console.print(_table_2(result, is_the_papers(spacecraft, _world(result))))
-    console.print()
+    out = console()
+    out.print(f"{result['controller']}: {_conditions(result, spacecraft)}\n")
+    out.print(_table_2(result, is_the_papers(spacecraft, _world(result))))
+    out.print()
     for name, value in _summary(result):
-        console.print(f"{name:<18}{value}")
+        out.print(f"{name:<18}{value}")
 
 
 def print_comparison(results: list[dict], spacecraft: Spacecraft) -> None:
@@ -47,9 +47,9 @@ def print_comparison(results: list[dict], spacecraft: Spacecraft) -> None:
 
     The paper's results stand beside those of its spacecraft, LM50, in its world.
     """
-    console = _console()
-    console.print(f"{_conditions(results[0], spacecraft)}\n")
-    table = _table("")
+    out = console()
+    out.print(f"{_conditions(results[0], spacecraft)}\n")
+    table = plain_table("")
     for result in results:
         table.add_column(result["controller"], justify="right", no_wrap=True)
     with_paper = is_the_papers(spacecraft, _world(results[0]))
@@ -66,16 +66,18 @@ def print_comparison(results: list[dict], spacecraft: Spacecraft) -> None:
         values = [r[quantity][statistic] for r in results]
         form = ".3g" if quantity == "impulse_N_m_s" else ".2f"
         table.add_row(name, *("–" if x is None else format(x, form) for x in values))
-    console.print(table)
+    out.print(table)
 
 
-def _console():
-    console = Console(highlight=False, markup=False)
-    console.width = max(console.width, TABLE_WIDTH)
-    return console
+def console() -> Console:
+    """Where tables are printed: at least so wide that each of their rows is a line."""
+    wide = Console(highlight=False, markup=False)
+    wide.width = max(wide.width, TABLE_WIDTH)
+    return wide
 
 
-def _table(first_column):
+def plain_table(first_column: str) -> Table:
+    """A table without borders, with its first column."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
     table.add_column(first_column, no_wrap=True)
     return table
@@ -96,7 +98,7 @@ def _conditions(result, spacecraft):
 
 
 def _table_2(result, with_paper):
-    table = _table("\n")
+    table = plain_table("\n")
     for state, quantity in PAPER_TABLE_2:
         title = f"{state.capitalize()}\n{SYMBOLS[quantity]}"
         table.add_column(title, justify="right", no_wrap=True)

@@ -4,7 +4,7 @@ This package imports nothing heavy, so that errors in a description are instant.
 """
 
 from attjax.world.aboard import Actuators, Uncertainty
-from attjax.world.description import IDEAL, World, names
+from attjax.world.description import IDEAL, World, made_for, names
 from attjax.world.distributions import LogUniform, Normal, Uniform
 from attjax.world.outside import Disturbances, Drag, Orbit, RadiationPressure, Sinusoid
 from attjax.world.telling import Gyro, Sensors, StarTracker
@@ -25,5 +25,6 @@ __all__ = [
     "Uncertainty",
     "Uniform",
     "World",
+    "made_for",
     "names",
 ]

@@ -6,7 +6,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Self
 
-from attjax.spacecraft import read_toml
+from attjax.spacecraft import LM50, Spacecraft, read_toml
 from attjax.world.aboard import Actuators, Uncertainty
 from attjax.world.outside import Disturbances, Orbit
 from attjax.world.parts import Part
@@ -116,3 +116,15 @@ def names() -> tuple[str, ...]:
     """Names of the named worlds."""
     found = (Path(str(x)) for x in resources.files("attjax.world").iterdir())
     return (IDEAL.name, *sorted(x.stem for x in found if x.suffix == ".toml"))
+
+
+def made_for(world: World) -> Spacecraft:
+    """The spacecraft that a named world was described for; LM50 for all others.
+
+    Example:
+        >>> made_for(World.named("cubesat-6u")).name, made_for(IDEAL).name
+        ('6U CubeSat', 'LM50')
+    """
+    path = Path(str(resources.files("attjax.world") / "spacecraft" / f"{world.name}.toml"))
+    is_named = world.name in names() and path.exists() and world == World.named(world.name)
+    return Spacecraft.from_toml(path) if is_named else LM50
