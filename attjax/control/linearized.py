@@ -105,6 +105,10 @@ def covariance_after(estimate: Any, motion: belief.Motion, model: Model) -> Tria
     rate = vectors.add(estimate.angular_velocity, motion.angular_velocity)
     rate = vectors.scaled(0.5, rate)
     at_once, steadily = _rate_noise(rate, model)
+    turning = [0] * 3
+    if known.rate is not None:
+        change = _change(estimate.angular_velocity, motion.angular_velocity)
+        turning = known.rate.share_of(change, rate)
     before = covariance.triangle(
         size,
         lambda i, j: estimate.covariance[i][j - i] + (at_once[i - 3] if 3 <= i == j < 6 else 0),
@@ -117,7 +121,7 @@ def covariance_after(estimate: Any, motion: belief.Motion, model: Model) -> Tria
         added[i, 3 + i] = half * steadily[i]
         added[3 + i, 3 + i] = steadily[i]
         if known.rate is not None and estimate.bias is not None:
-            added[6 + i, 6 + i] = known.rate.walk**2 * period
+            added[6 + i, 6 + i] = known.rate.walk**2 * period + turning[i]
         if known.torque is not None and estimate.torque is not None:
             walk = known.torque.walk + known.torque.walk_per_radian * _length(rate)
             added[size - 3 + i, size - 3 + i] = walk * period
@@ -148,6 +152,10 @@ def _rate_noise(rate, model):
     if not model.held.value:
         return pulsed, steady
     return [jnp.zeros_like(x) for x in pulsed], [x + y for x, y in zip(pulsed, steady)]
+
+
+def _change(before, after):
+    return tuple(y - x for x, y in zip(before, after))
 
 
 def _length(vector):

@@ -26,7 +26,7 @@ def correct(estimate: Any, expected: Any, told: Measurement, noise: Noise) -> An
         told: by components, whether there is one as 1 or 0.
         noise: of it.
     """
-    numbers = _rates(estimate, expected, told, noise) + _angles(estimate, expected, told, noise)
+    numbers = innovations(estimate, expected, told, noise)
     rounding = float(jnp.finfo(estimate.quaternion[0].dtype).eps)
     nothing = [jnp.zeros_like(estimate.quaternion[0])] * size_of(estimate)
     spread, error = covariance.updated(estimate.covariance, nothing, numbers, rounding)
@@ -42,6 +42,15 @@ def correct(estimate: Any, expected: Any, told: Measurement, noise: Noise) -> An
     if estimate.torque is not None:
         corrected = corrected.replace(torque=vectors.add(estimate.torque, tuple(error[-3:])))
     return corrected
+
+
+def innovations(estimate: Any, expected: Any, told: Measurement, noise: Noise) -> list[Scalar]:
+    """What a measurement says that was not expected: three rates, rad/s, and three angles, rad.
+
+    Args:
+        estimate, expected, told, noise: as of :func:`correct`.
+    """
+    return _rates(estimate, expected, told, noise) + _angles(estimate, expected, told, noise)
 
 
 def _rates(estimate, expected, told, noise):
@@ -67,10 +76,7 @@ def rate_variances(rate: vectors.Vector, noise: Noise) -> list[Any]:
     rounding = noise.rounding * (squared + LEAST)
     if noise.rate is None:
         return [rounding] * 3
-    given = noise.rate.sample, noise.rate.along, noise.rate.across
-    sample, along, across = (x**2 for x in given)
-    fixed = sample + rounding + across * squared
-    return [fixed + (along - across) * x * x for x in rate]
+    return [noise.rate.sample**2 + rounding] * 3
 
 
 def _angles(estimate, expected, told, noise):
@@ -120,8 +126,10 @@ def first_covariance(estimate: Any, noise: Noise) -> Triangle:
     size, rates = size_of(estimate), rate_variances(estimate.angular_velocity, noise)
     axes, angles = frame(noise), angle_variances(estimate.quaternion, noise)
     zero = jnp.zeros_like(estimate.quaternion[0])
-    known = None if noise.rate is None else noise.rate.bias
-    bias = zero if known is None else known**2
+    has_bias, bias = estimate.bias is not None, [zero] * 3
+    if noise.rate is not None and noise.rate.bias is not None:
+        turning = noise.rate.share_of(estimate.angular_velocity, (0.0, 0.0, 0.0))
+        bias = [noise.rate.bias**2 + x for x in turning]
 
     def element(i, j):
         if j < 3:
@@ -132,9 +140,9 @@ def first_covariance(estimate: Any, noise: Noise) -> Triangle:
             ]
             return sum(terms, zero)
         if i == j and i < 6:
-            return rates[i - 3] + bias
-        if known is not None and i >= 3 and j < 9 and j - i in (0, 3):
-            return bias if i == j else -bias
+            return rates[i - 3] + bias[i - 3]
+        if has_bias and i >= 3 and j < 9 and j - i in (0, 3):
+            return bias[i % 3] if i == j else -bias[i % 3]
         return noise.torque if i == j else zero
 
     return covariance.triangle(size, element)

@@ -4,6 +4,7 @@ All of it follows from the world's description: a flight loop has no numbers set
 """
 
 import math
+from typing import Any
 
 import chex
 import jax.numpy as jnp
@@ -11,6 +12,7 @@ from flax import struct
 
 from attjax.dynamics.clock import Clock
 from attjax.dynamics.disturbances import EARTH_DIPOLE, EARTH_MU, EARTH_RADIUS, SOLAR_PRESSURE
+from attjax.dynamics.vectors import Vector
 from attjax.envs.sensors import ALLAN_TOP, ARCSEC, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, PPM, clock_of
 from attjax.spacecraft import INTEGRATION_STEP
 from attjax.world import World
@@ -38,7 +40,7 @@ class RateNoise(struct.PyTreeNode):
     Attributes:
         sample: standard deviation of a sample about each axis, rad/s.
         along, across: of its error's share in the rate about the axis, and about the others.
-        bias: of what is always the same at an episode's start, rad/s; None: it has no bias.
+        bias: at an episode's start, rad/s; None: it has none, and all axes are right.
         walk: of what it changes by, rad/s in √s.
         limit: rad/s; a sample of it says nothing.
         clock: of the samples.
@@ -51,6 +53,20 @@ class RateNoise(struct.PyTreeNode):
     walk: chex.Numeric
     limit: float | None = struct.field(pytree_node=False)
     clock: Clock = struct.field(pytree_node=False)
+
+    def share_of(self, change: Vector, rate: Vector) -> list[Any]:
+        """Variance, about each axis, of what its bias seems to change by as the rate changes.
+
+        Scale factors and misalignments are the same all the time: from rest to ω the variance grows
+        to σ² ω², by σ² (2 ω dω + dω²) with each change.
+
+        Args:
+            change, rate: by components, rad/s.
+        """
+        grown = [abs(x) * (abs(x) + 2 * abs(w)) for x, w in zip(change, rate)]
+        total = grown[0] + grown[1] + grown[2]
+        along, across = self.along**2, self.across**2
+        return [along * x + across * (total - x) for x in grown]
 
 
 class TorqueNoise(struct.PyTreeNode):
@@ -169,11 +185,13 @@ def _rate_noise(gyro, period):
     white = DEG_PER_ROOT_HOUR * _root_mean_square(gyro.angle_random_walk_deg_per_root_h)
     fixed = DEG_PER_HOUR * _root_mean_square(gyro.bias_deg_per_h) / 3**0.5
     wandering = DEG_PER_HOUR / ALLAN_TOP * _root_mean_square(gyro.bias_instability_deg_per_h)
-    has_bias = fixed > 0 or wandering > 0
+    along = PPM * _root_mean_square(gyro.scale_factor_ppm)
+    across = ARCSEC * _root_mean_square(gyro.misalignment_arcsec) / 2**0.5
+    has_bias = any(x > 0 for x in (fixed, wandering, along, across))
     return RateNoise(
         sample=jnp.sqrt(white**2 / interval + gyro.resolution**2 / 12),
-        along=PPM * _root_mean_square(gyro.scale_factor_ppm),
-        across=ARCSEC * _root_mean_square(gyro.misalignment_arcsec) / 2**0.5,
+        along=along,
+        across=across,
         bias=math.hypot(fixed, wandering) if has_bias else None,
         walk=wandering * math.sqrt(2 / gyro.bias_correlation_time),
         limit=gyro.rate_limit,

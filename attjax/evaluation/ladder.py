@@ -57,8 +57,8 @@ def _inertia():
 def _torques(count, largest):
     worlds = {}
     for angle in (5, 10):
-        gain = Uniform(1 - angle / 100, 1 + angle / 100)
-        actuators = Actuators(gain=gain, misalignment_deg=angle)
+        of_axis = Uniform(1 - angle / 100, 1 + angle / 100)
+        actuators = Actuators(gain=of_axis, misalignment_deg=angle)
         worlds[f"torques turned by {angle}°, ±{angle} %"] = World(actuators=actuators)
     for share in (0.002, 0.01):
         torque = share * largest

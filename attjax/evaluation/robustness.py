@@ -94,8 +94,8 @@ def _is_classical(controller):
 
 
 def _flown(controllers, env, flights, name):
-    plain = tuple(jax.tree_util.Partial(x) for x in controllers.values())
-    crew = (*map(flight_loop, plain), *plain)
+    plain = [jax.tree_util.Partial(x) for x in controllers.values()]
+    crew: Any = (*map(flight_loop, plain), *plain)
     params, key = env.default_params, jax.random.key(flights.seed)
     flown = fly_side_by_side(crew, env, params, key, flights.episodes)
     names = [(x, has_loop) for has_loop in (True, False) for x in controllers]
