@@ -61,17 +61,13 @@ def torque_during(pulses: tuple[Pulse, ...], held: bool, number: Any) -> Vector:
     if held:
         first, *others = pulses
         return functools.reduce(
-            lambda before, pulse: _chosen(pulse.start <= number, pulse.torque, before),
+            lambda before, pulse: vectors.chosen(pulse.start <= number, pulse.torque, before),
             others,
             first.torque,
         )
     zeros = tuple(jnp.zeros_like(x) for x in pulses[0].torque)
-    acting = [_chosen(pulse.start == number, pulse.torque, zeros) for pulse in pulses]
+    acting = [vectors.chosen(pulse.start == number, pulse.torque, zeros) for pulse in pulses]
     return functools.reduce(vectors.add, acting)
-
-
-def _chosen(condition, a, b):
-    return tuple(jnp.where(condition, x, y) for x, y in zip(a, b))
 
 
 @jax.tree_util.register_static
@@ -128,7 +124,7 @@ class ForcedEquations(NamedTuple):
         """The change from the agent step's start to that RK4 step's end, and what is seen then."""
         moved = change.quaternion, change.angular_velocity
         seen = [
-            None if sample is None else _chosen(number + 1 == sample, now, before)
+            None if sample is None else vectors.chosen(number + 1 == sample, now, before)
             for sample, now, before in zip(self.samples, moved, change.seen)
         ]
         return change._replace(seen=tuple(seen))

@@ -3,19 +3,36 @@
 For what stands in a loop over RK4 steps, where JAX's arrays of three would be slow.
 """
 
+import functools
 import operator
 from typing import Any, TypeAlias, TypeVar
 
 import jax
+import jax.numpy as jnp
+import numpy as np
 
 Tree = TypeVar("Tree")
 Vector: TypeAlias = tuple[Any, Any, Any]
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
 
 
+def components(tree: Any) -> Any:
+    """The same tree with vectors and matrices, arrays, by components: one by one, and by rows."""
+
+    def taken_apart(x):
+        return tuple(map(taken_apart, x)) if np.ndim(x) else x
+
+    return jax.tree.map(taken_apart, tree)
+
+
 def add(tree: Tree, other: Tree) -> Tree:
     """The sum of two vectors, or of any two trees of the same structure, leaf by leaf."""
     return jax.tree.map(operator.add, tree, other)
+
+
+def chosen(condition: Any, a: Tree, b: Tree) -> Tree:
+    """One of two vectors, or of any two trees of the same structure."""
+    return jax.tree.map(functools.partial(jnp.where, condition), a, b)
 
 
 def scaled(factor: Any, a: Vector) -> Vector:

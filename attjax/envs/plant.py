@@ -19,7 +19,9 @@ from attjax.dynamics.equations import Kinematics, PrincipalTerms, TensorTerms, a
 from attjax.dynamics.forced_motion import ForcedEquations, ForcedState, Held
 from attjax.dynamics.fused_loop import apart, together
 from attjax.dynamics.integration import AgentStep
+from attjax.dynamics.noise import Noise
 from attjax.dynamics.sensing import Seen, Sensing
+from attjax.dynamics.vectors import components
 from attjax.spacecraft import INTEGRATION_STEP
 
 
@@ -76,7 +78,9 @@ class Plant(struct.PyTreeNode):
         plant = self.replace(queue=self.queue.later(rk4_steps))
         if self.sensing is not None:
             seen = _attained(start, *(x or y for x, y in zip(change.seen, change[:2])))
-            plant = plant.replace(sensing=self.sensing.after(seen, end, times, self._draws(time)))
+            noise = Noise.of(self.key, time)
+            sensing = self.sensing.after(components(seen), components(end), times, noise)
+            plant = plant.replace(sensing=sensing)
         return *end, plant
 
     def _draws(self, time):
