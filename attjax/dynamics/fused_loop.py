@@ -117,11 +117,12 @@ def _flattened(function, operands):
 
 def _order(given, results):
     """Which operand stands where, so that each result finds one of its type; None: none is left."""
-    left, order = dict(enumerate(given)), []
+    left, order = list(range(len(given))), []
     for result in results:
-        order.append(next((n for n, x in left.items() if x.dtype == result.dtype), None))
-        left.pop(order[-1], None)
-    return order + list(left)
+        place = next((n for n in left if given[n].dtype == result.dtype), None)
+        left = [n for n in left if n != place]
+        order.append(place)
+    return order + left
 
 
 def _stand_in(given, result):

@@ -14,7 +14,7 @@ from attjax.dynamics.clock import Clock
 from attjax.dynamics.fused_loop import together
 from attjax.dynamics.noise import Noise
 from attjax.dynamics.sensors import Gyro, StarTracker
-from attjax.dynamics.vectors import chosen, components
+from attjax.dynamics.vectors import chosen, components, unit
 from attjax.spacecraft import INTEGRATION_STEP
 
 
@@ -83,14 +83,15 @@ class Sensing(struct.PyTreeNode):
         """The sensors at the end of an agent step.
 
         Args:
-            seen: what was sampled in it, by components.
-            end: the state at its end, by components.
+            seen: what was sampled in it, by components; a quaternion of any length, which is
+                made 1 here, for a loop that looks for another's arrays is not vectorised.
+            end: the state at its end, likewise.
             times: of its start and its end, RK4 steps since the episode's start.
             noise: of the agent step.
         """
         wandered, waiting, told = together(_later, components(self), seen, end, times, noise)
         gyro = self.gyro
-        if wandered is not None:
+        if gyro is not None and wandered is not None:
             gyro = gyro.replace(wandered=jnp.stack(wandered))
         return self.replace(gyro=gyro, waiting=jnp.stack(waiting), told=_stacked(told))
 
@@ -128,8 +129,9 @@ def _later(sensing, seen, end, times, noise):
     start, now = times
     told_attitude, has_attitude = _told(tracker, start, now)
     _, has_rate = _told(gyro, start, now)
-    attitude = chosen(told_attitude > start, seen.quaternion, sensing.waiting)
-    waiting = chosen(tracker.newest_taken(now) > start, seen.quaternion, sensing.waiting)
+    seen_attitude = unit(seen.quaternion)
+    attitude = chosen(told_attitude > start, seen_attitude, sensing.waiting)
+    waiting = chosen(tracker.newest_taken(now) > start, seen_attitude, sensing.waiting)
     rate, wandered = seen.angular_velocity, None
     if sensing.gyro is not None:
         seconds = (now - start) * jnp.asarray(INTEGRATION_STEP, rate[0].dtype)

@@ -93,9 +93,7 @@ class StarTracker(struct.PyTreeNode):
         x, y, z = (np.array(self.boresight) / np.linalg.norm(self.boresight)).tolist()
         each = noise.normal("star_tracker", 3, quaternion[0].dtype)
         along = (self.about - self.across) * vectors.dot((x, y, z), each)
-        return quaternions.turned(
-            quaternion, vectors.combined(self.across, each, along, (x, y, z))
-        )
+        return quaternions.turned(quaternion, vectors.combined(self.across, each, along, (x, y, z)))
 
     def can_see(self, angular_velocity: Vector) -> chex.Numeric:
         """Whether it says anything at a rate, rad/s."""

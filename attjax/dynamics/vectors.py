@@ -50,6 +50,12 @@ def dot(a: Vector, b: Vector) -> Any:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+def unit(a: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The vector, of any number of components, scaled to unit length."""
+    length = jnp.sqrt(sum(x * x for x in a))
+    return tuple(x / length for x in a)
+
+
 def cross(a: Vector, b: Vector) -> Vector:
     """The cross product a × b.
 
