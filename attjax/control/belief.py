@@ -91,11 +91,11 @@ def _moved(estimate, queue, context, step):
         samples=tuple(samples),
     )
     change: Any = integration.change(agent_step, start, equations, limit)
-    end = vectors.normalized(vectors.add(start.quaternion, change.quaternion))
+    end = vectors.unit(vectors.add(start.quaternion, change.quaternion))
     turned, accelerated = change.seen
     since_sample = None
     if turned is not None:
-        sampled = vectors.normalized(vectors.add(start.quaternion, turned))
+        sampled = vectors.unit(vectors.add(start.quaternion, turned))
         since_sample = vectors.then(vectors.conjugate(sampled), end)
     return Motion(
         quaternion=end,

@@ -33,7 +33,7 @@ def correct(estimate: Any, expected: Any, told: Measurement, noise: Noise) -> An
     half = vectors.scaled(0.5, tuple(error[:3]))
     turned = vectors.then(estimate.quaternion, (*half, jnp.ones_like(half[0])))
     corrected = estimate.replace(
-        quaternion=vectors.normalized(turned),
+        quaternion=vectors.unit(turned),
         angular_velocity=vectors.add(estimate.angular_velocity, tuple(error[3:6])),
         covariance=spread,
     )

@@ -1,7 +1,7 @@
 """Torques that nobody commands.
 
 Where the spacecraft is in its orbit changes so slowly that it is taken in the middle of an agent
-step; where it points to, at each stage of each RK4 step. A force f on a lever a, or a dipole a in a
+step; where it points to, in the middle of each RK4 step. A force f on a lever a, or a dipole a in a
 field f, gives a × C f, with f in the target's frame and the attitude's matrix C. With all of them
 in one matrix M = Σ a fᵀ, that is as cheap for many as for one.
 """

@@ -15,6 +15,7 @@ from attjax.dynamics import vectors
 from attjax.dynamics.disturbances import Acting, OwnDisturbance
 from attjax.dynamics.equations import Kinematics, PrincipalTerms, TensorTerms
 from attjax.dynamics.vectors import Matrix, Vector
+from attjax.spacecraft import INTEGRATION_STEP
 
 
 class ForcedState(NamedTuple):
@@ -61,17 +62,13 @@ def torque_during(pulses: tuple[Pulse, ...], held: bool, number: Any) -> Vector:
     if held:
         first, *others = pulses
         return functools.reduce(
-            lambda before, pulse: _chosen(pulse.start <= number, pulse.torque, before),
+            lambda before, pulse: vectors.chosen(pulse.start <= number, pulse.torque, before),
             others,
             first.torque,
         )
     zeros = tuple(jnp.zeros_like(x) for x in pulses[0].torque)
-    acting = [_chosen(pulse.start == number, pulse.torque, zeros) for pulse in pulses]
+    acting = [vectors.chosen(pulse.start == number, pulse.torque, zeros) for pulse in pulses]
     return functools.reduce(vectors.add, acting)
-
-
-def _chosen(condition, a, b):
-    return tuple(jnp.where(condition, x, y) for x, y in zip(a, b))
 
 
 @jax.tree_util.register_static
@@ -95,7 +92,7 @@ class ForcedEquations(NamedTuple):
         own: disturbances of a user's own.
         kinematics: of the attitude.
         samples: after how many RK4 steps star tracker and gyro sample; None: at the end.
-        torque: of the pulses in this RK4 step, N m; None before :meth:`during`.
+        torque: of pulses and of what acts in this RK4 step, N m; None before :meth:`during`.
     """
 
     pulses: tuple[Pulse, ...]
@@ -120,15 +117,22 @@ class ForcedEquations(NamedTuple):
         return True
 
     def during(self, number: Any, state: ForcedState) -> "ForcedEquations":
-        """The equations of that RK4 step, counted from 0: its pulses' torque is on."""
-        del state
-        return self._replace(torque=torque_during(self.pulses, self.held.value, number))
+        """The equations of that RK4 step, counted from 0: its pulses' torque is on.
+
+        What acts does so as at the attitude in the step's middle: of one that turns by φ
+        meanwhile it is off by φ²/6, and to find it at each stage takes 1.7 times as long.
+        """
+        turn = self.kinematics.rate(state.quaternion, state.angular_velocity)
+        middle = vectors.add(state.quaternion, tuple(INTEGRATION_STEP / 2 * x for x in turn))
+        torque = torque_during(self.pulses, self.held.value, number)
+        acting = self.acting.torque(middle)
+        return self._replace(torque=torque if acting is None else vectors.add(torque, acting))
 
     def after(self, number: Any, change: ForcedState) -> ForcedState:
         """The change from the agent step's start to that RK4 step's end, and what is seen then."""
         moved = change.quaternion, change.angular_velocity
         seen = [
-            None if sample is None else _chosen(number + 1 == sample, now, before)
+            None if sample is None else vectors.chosen(number + 1 == sample, now, before)
             for sample, now, before in zip(self.samples, moved, change.seen)
         ]
         return change._replace(seen=tuple(seen))
@@ -139,7 +143,7 @@ class ForcedEquations(NamedTuple):
 
     def rate(self, state: ForcedState) -> ForcedState:
         """Rate of change of the state."""
-        torques, phasor_rate = [self.torque, self.acting.torque(state.quaternion)], None
+        torques, phasor_rate = [self.torque], None
         torques += [x.torque(state.quaternion, state.angular_velocity) for x in self.own]
         if self.swinging is not None and state.phasor is not None:
             (cosine, sine), (amplitude, rate) = state.phasor, self.swinging

@@ -27,9 +27,9 @@ def one_loop(function: Callable[..., Tree], *operands: Any) -> Tree:
     is for CPU only; it cannot be differentiated.
 
     Args:
-        function: of trees of scalars, to a tree of scalars of the operands' type; elementwise
-            operations only, and nothing but numbers from outside.
-        operands: trees of scalars of one floating-point type.
+        function: of trees of scalars, to a tree of scalars; elementwise operations only, and
+            nothing but numbers from outside.
+        operands: trees of scalars of any types.
 
     Returns:
         The function's tree.
@@ -83,7 +83,7 @@ def any_order(call: Callable[[Scalars], Scalars]) -> Callable[[Scalars, Scalars]
 
 
 class _Flat(NamedTuple):
-    """A function of trees as one of scalars, to as many: of fewer, the first is repeated."""
+    """A function of trees as one of scalars, to as many of the same types."""
 
     scalars: list[chex.Array]
     call: Callable[[Scalars], Scalars]
@@ -92,23 +92,43 @@ class _Flat(NamedTuple):
 
 def _flattened(function, operands):
     leaves, structure = jax.tree.flatten(operands)
-    shapes = jax.eval_shape(function, *operands)
-    arguments, outputs = len(leaves), len(jax.tree.leaves(shapes))
-    scalars = [jnp.asarray(x) for x in leaves]
-    scalars += scalars[:1] * (outputs - arguments)
+    results, result_structure = jax.tree.flatten(jax.eval_shape(function, *operands))
+    given = [jnp.asarray(x) for x in leaves]
+    order = _order(given, results)
+    places = [order.index(n) for n in range(len(given))]
+    scalars = [
+        _stand_in(given, result) if n is None else given[n]
+        for n, result in zip(order, results + given)
+    ]
 
     # Called, for StableHLO's ReduceOpUnusedResultCanon walks through the reducer itself once for
     # each result that is ignored and again from each use: exponentially long. No call is entered.
     called = jax.jit(function)
 
     def call(current):
-        values = called(*jax.tree.unflatten(structure, current[:arguments]))
-        return (*jax.tree.leaves(values), *current[outputs:])
+        values = called(*jax.tree.unflatten(structure, [current[n] for n in places]))
+        return (*jax.tree.leaves(values), *current[len(results) :])
 
     def tree(values):
-        return jax.tree.unflatten(jax.tree.structure(shapes), values[:outputs])
+        return jax.tree.unflatten(result_structure, values[: len(results)])
 
     return _Flat(scalars, call, tree)
+
+
+def _order(given, results):
+    """Which operand stands where, so that each result finds one of its type; None: none is left."""
+    left, order = list(range(len(given))), []
+    for result in results:
+        place = next((n for n in left if given[n].dtype == result.dtype), None)
+        left = [n for n in left if n != place]
+        order.append(place)
+    return order + left
+
+
+def _stand_in(given, result):
+    """For an operand where there are more results: any of the type, so that none is made up."""
+    zero = jnp.zeros((), result.dtype)
+    return next((x for x in given if x.dtype == result.dtype), zero)
 
 
 def _reduced(scalars, count, reducer):

@@ -85,24 +85,30 @@ def derivative(
     )
 
 
-def turned(
-    quaternion: Float[Array | np.ndarray, "4"], turn: Float[Array | np.ndarray, "3"]
-) -> Float[Array, "4"]:
-    """The attitude (4,) after a further turn of the body, (3,), axis times angle in its frame, rad.
+def turned(quaternion: Sequence[Any], turn: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
+    """The attitude after a further turn of the body, axis times angle in its frame, rad.
+
+    Args:
+        quaternion: four components, scalar last, as an array or one by one.
+        turn: three, likewise.
+
+    Returns:
+        Tuple of the four components.
 
     Example:
         >>> start = from_axis_angle(jnp.array([0.0, 0.0, 1.0]), 0.3)
-        >>> round(rotation_vector(turned(start, jnp.array([0.0, 0.0, 0.2])))[2].item(), 6)
+        >>> after = jnp.stack(turned(start, jnp.array([0.0, 0.0, 0.2])))
+        >>> round(rotation_vector(after)[2].item(), 6)
         0.5
     """
-    half = turn / 2
-    angle = square_root(squared_norm(half))
-    tiny = jnp.finfo(half.dtype).tiny
-    vector = half * jnp.where(angle > tiny, jnp.sin(angle) / jnp.maximum(angle, tiny), 1)
-    scalar = jnp.cos(angle)
-    v, qs = quaternion[:3], quaternion[3]
-    product = qs * vector + scalar * v + jnp.cross(v, vector)
-    return jnp.append(product, qs * scalar - jnp.sum(v * vector))
+    half = vectors.scaled(0.5, (turn[0], turn[1], turn[2]))
+    angle = square_root(vectors.dot(half, half))
+    tiny = jnp.finfo(angle.dtype).tiny
+    sine = jnp.where(angle > tiny, jnp.sin(angle) / jnp.maximum(angle, tiny), 1)
+    a, x = vectors.scaled(sine, half), jnp.cos(angle)
+    q, qs = (quaternion[0], quaternion[1], quaternion[2]), quaternion[3]
+    turned = vectors.add(vectors.combined(qs, a, x, q), vectors.cross(q, a))
+    return *turned, qs * x - vectors.dot(q, a)
 
 
 def rotation_vector(quaternion: Float[Array | np.ndarray, "4"]) -> Float[Array, "3"]:

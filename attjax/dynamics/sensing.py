@@ -4,15 +4,17 @@ A sensor samples at multiples of its period since the episode's start, and what 
 told at the first decision after its latency.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import chex
 import jax.numpy as jnp
 from flax import struct
 
 from attjax.dynamics.clock import Clock
-from attjax.dynamics.draws import Draws
+from attjax.dynamics.fused_loop import together
+from attjax.dynamics.noise import Noise
 from attjax.dynamics.sensors import Gyro, StarTracker
+from attjax.dynamics.vectors import chosen, components, unit
 from attjax.spacecraft import INTEGRATION_STEP
 
 
@@ -33,10 +35,10 @@ class Measurement(struct.PyTreeNode):
 
 
 class Seen(NamedTuple):
-    """What the sensors of an agent step have sampled: attitude (4,) and rate (3,)."""
+    """What the sensors sample: attitude (4,) and rate (3,), rad/s; also by components."""
 
-    quaternion: chex.Array
-    angular_velocity: chex.Array
+    quaternion: Any
+    angular_velocity: Any
 
 
 class Sensing(struct.PyTreeNode):
@@ -76,61 +78,75 @@ class Sensing(struct.PyTreeNode):
         return tracker, gyro
 
     def after(
-        self, seen: Seen, end: Seen, times: tuple[chex.Array, chex.Array], draws: Draws
+        self, seen: Seen, end: Seen, times: tuple[chex.Array, chex.Array], noise: Noise
     ) -> "Sensing":
         """The sensors at the end of an agent step.
 
         Args:
-            seen: what was sampled in it.
-            end: the state at its end.
+            seen: what was sampled in it, by components; a quaternion of any length, which is
+                made 1 here, for a loop that looks for another's arrays is not vectorised.
+            end: the state at its end, likewise.
             times: of its start and its end, RK4 steps since the episode's start.
-            draws: of the agent step.
+            noise: of the agent step.
         """
-        noise = draws.normal("sensors", (9,))
-        tracker, gyro = self.clocks
-        start, now = times
-        told_attitude, has_attitude = _told(tracker, start, now)
-        _, has_rate = _told(gyro, start, now)
-        attitude = jnp.where(told_attitude > start, seen.quaternion, self.waiting)
-        is_fresh = tracker.newest_taken(now) > start
-        waiting = jnp.where(is_fresh, seen.quaternion, self.waiting)
-        its_gyro = self.gyro
-        rate = seen.angular_velocity
-        if its_gyro is not None:
-            seconds = (now - start) * jnp.asarray(INTEGRATION_STEP, rate.dtype)
-            its_gyro = its_gyro.later(seconds, noise[3:6])
-            rate = its_gyro.reading(rate, noise[:3])
-        if self.star_tracker is not None:
-            attitude = self.star_tracker.reading(attitude, noise[6:])
-            has_attitude &= self.star_tracker.can_see(end.angular_velocity)
-        told = Measurement(
-            quaternion=jnp.where(has_attitude, attitude, self.told.quaternion),
-            has_quaternion=has_attitude,
-            angular_velocity=jnp.where(has_rate, rate, self.told.angular_velocity),
-            has_angular_velocity=has_rate,
-        )
-        return self.replace(gyro=its_gyro, waiting=waiting, told=told)
+        wandered, waiting, told = together(_later, components(self), seen, end, times, noise)
+        gyro = self.gyro
+        if gyro is not None and wandered is not None:
+            gyro = gyro.replace(wandered=jnp.stack(wandered))
+        return self.replace(gyro=gyro, waiting=jnp.stack(waiting), told=_stacked(told))
 
     @classmethod
     def begun(
-        cls, sensors: tuple[StarTracker | None, Gyro | None], state: Seen, draws: Draws
+        cls, sensors: tuple[StarTracker | None, Gyro | None], state: Seen, noise: Noise
     ) -> "Sensing":
         """The sensors at an episode's start, which each of them tells at once.
 
         Args:
             sensors: star tracker and gyro.
-            state: attitude and rate at the start.
-            draws: of the start.
+            state: attitude (4,) and rate (3,) at the start.
+            noise: of the start.
         """
-        tracker, gyro = sensors
-        noise, always = draws.normal("sensors", (6,)), jnp.asarray(True)
-        attitude, rate = state
+        tracker, gyro = components(sensors)
+        always = jnp.asarray(True)
+        attitude, rate = components(state)
         if tracker is not None:
-            attitude = tracker.reading(attitude, noise[3:])
+            attitude = tracker.reading(attitude, noise)
         if gyro is not None:
-            rate = gyro.reading(rate, noise[:3])
-        told = Measurement(attitude, always, rate, always)
-        return cls(gyro=gyro, star_tracker=tracker, waiting=state.quaternion, told=told)
+            rate = gyro.reading(rate, noise)
+        told = _stacked(Measurement(attitude, always, rate, always))
+        return cls(sensors[1], sensors[0], waiting=state.quaternion, told=told)
+
+
+def _stacked(told):
+    return told.replace(
+        quaternion=jnp.stack(told.quaternion), angular_velocity=jnp.stack(told.angular_velocity)
+    )
+
+
+def _later(sensing, seen, end, times, noise):
+    """What of the sensors is another after an agent step: a wandering bias, waiting, told."""
+    tracker, gyro = sensing.clocks
+    start, now = times
+    told_attitude, has_attitude = _told(tracker, start, now)
+    _, has_rate = _told(gyro, start, now)
+    seen_attitude = unit(seen.quaternion)
+    attitude = chosen(told_attitude > start, seen_attitude, sensing.waiting)
+    waiting = chosen(tracker.newest_taken(now) > start, seen_attitude, sensing.waiting)
+    rate, wandered = seen.angular_velocity, None
+    if sensing.gyro is not None:
+        seconds = (now - start) * jnp.asarray(INTEGRATION_STEP, rate[0].dtype)
+        its_gyro = sensing.gyro.later(seconds, noise)
+        rate, wandered = its_gyro.reading(rate, noise), its_gyro.wandered
+    if sensing.star_tracker is not None:
+        attitude = sensing.star_tracker.reading(attitude, noise)
+        has_attitude &= sensing.star_tracker.can_see(end.angular_velocity)
+    told = Measurement(
+        quaternion=chosen(has_attitude, attitude, sensing.told.quaternion),
+        has_quaternion=has_attitude,
+        angular_velocity=chosen(has_rate, rate, sensing.told.angular_velocity),
+        has_angular_velocity=has_rate,
+    )
+    return wandered, waiting, told
 
 
 def _told(clock, start, now):

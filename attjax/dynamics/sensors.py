@@ -1,13 +1,19 @@
-"""A gyro and a star tracker: what they say of a rate and of an attitude."""
+"""A gyro and a star tracker: what they say of a rate and of an attitude.
+
+They hold arrays; their methods are of the same by components, for a loop over a batch.
+"""
 
 import chex
+import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from attjax.dynamics import numerics
 from attjax.dynamics import quaternion as quaternions
+from attjax.dynamics import vectors
 from attjax.dynamics.clock import Clock
+from attjax.dynamics.noise import Noise
+from attjax.dynamics.vectors import Vector
 
 
 class Gyro(struct.PyTreeNode):
@@ -35,31 +41,35 @@ class Gyro(struct.PyTreeNode):
     resolution: float = struct.field(pytree_node=False, default=0.0)
     clock: Clock = struct.field(pytree_node=False, default=Clock())
 
-    def reading(self, angular_velocity: chex.Array, noise: chex.Array) -> chex.Array:
-        """What it says of a rate (3,), rad/s, with standard normal noise (3,)."""
+    def reading(self, angular_velocity: Vector, noise: Noise) -> Vector:
+        """What it says of a rate, rad/s, at a decision."""
         rate = angular_velocity
         if self.matrix is not None:
-            rate = jnp.sum(self.matrix * rate, axis=1)
+            rate = vectors.times(self.matrix, rate)
         for error in (self.bias, self.wandered):
-            rate = rate if error is None else rate + error
+            rate = rate if error is None else vectors.add(rate, error)
         if self.noise is not None:
-            rate = rate + self.noise * noise
+            white = noise.normal("gyro", 3, rate[0].dtype)
+            rate = vectors.add(rate, vectors.scaled(self.noise, white))
         if self.rate_limit is not None:
-            rate = jnp.clip(rate, -self.rate_limit, self.rate_limit)
+            limit = self.rate_limit
+            rate = jax.tree.map(lambda x: jnp.clip(x, -limit, limit), rate)
         if self.resolution:
-            rate = jnp.round(rate / self.resolution) * self.resolution
+            step = self.resolution
+            rate = jax.tree.map(lambda x: jnp.round(x / step) * step, rate)
         return rate
 
-    def later(self, seconds: chex.Numeric, noise: chex.Array) -> "Gyro":
-        """The same after some time, with standard normal noise (3,): its bias has wandered.
+    def later(self, seconds: chex.Numeric, noise: Noise) -> "Gyro":
+        """The same after some time, at a decision: its bias has wandered.
 
         Exactly as a Gauss-Markov process of first order does in that time.
         """
         if self.wandering is None or self.wandered is None:
             return self
         kept = jnp.exp(-seconds / self.correlation_time)
-        fresh = self.wandering * jnp.sqrt(1 - kept**2) * noise
-        return self.replace(wandered=kept * self.wandered + fresh)
+        size = self.wandering * jnp.sqrt(1 - kept**2)
+        fresh = noise.normal("gyro.wandered", 3, size.dtype)
+        return self.replace(wandered=vectors.combined(kept, self.wandered, size, fresh))
 
 
 class StarTracker(struct.PyTreeNode):
@@ -78,16 +88,15 @@ class StarTracker(struct.PyTreeNode):
     most_rate: float | None = struct.field(pytree_node=False, default=None)
     clock: Clock = struct.field(pytree_node=False, default=Clock())
 
-    def reading(self, quaternion: chex.Array, noise: chex.Array) -> chex.Array:
-        """What it says of an attitude (4,), with standard normal noise (3,)."""
-        axis = np.array(self.boresight) / np.linalg.norm(self.boresight)
-        axis = jnp.asarray(axis, quaternion.dtype)
-        along = jnp.sum(noise * axis)
-        error = self.across * noise + (self.about - self.across) * along * axis
-        return quaternions.turned(quaternion, error)
+    def reading(self, quaternion: tuple, noise: Noise) -> tuple:
+        """What it says of an attitude, four components, at a decision."""
+        x, y, z = (np.array(self.boresight) / np.linalg.norm(self.boresight)).tolist()
+        each = noise.normal("star_tracker", 3, quaternion[0].dtype)
+        along = (self.about - self.across) * vectors.dot((x, y, z), each)
+        return quaternions.turned(quaternion, vectors.combined(self.across, each, along, (x, y, z)))
 
-    def can_see(self, angular_velocity: chex.Array) -> chex.Array:
-        """Whether it says anything at a rate (3,), rad/s."""
+    def can_see(self, angular_velocity: Vector) -> chex.Numeric:
+        """Whether it says anything at a rate, rad/s."""
         if self.most_rate is None:
-            return jnp.asarray(True)
-        return numerics.squared_norm(angular_velocity) <= self.most_rate**2
+            return True
+        return vectors.dot(angular_velocity, angular_velocity) <= self.most_rate**2

@@ -3,11 +3,13 @@
 For what stands in a loop over RK4 steps, where JAX's arrays of three would be slow.
 """
 
+import functools
 import operator
 from typing import Any, TypeAlias, TypeVar
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 Tree = TypeVar("Tree")
 Vector: TypeAlias = tuple[Any, Any, Any]
@@ -15,9 +17,23 @@ Matrix: TypeAlias = tuple[Vector, Vector, Vector]
 Quaternion: TypeAlias = tuple[Any, Any, Any, Any]
 
 
+def components(tree: Any) -> Any:
+    """The same tree with vectors and matrices, arrays, by components: one by one, and by rows."""
+
+    def taken_apart(x):
+        return tuple(map(taken_apart, x)) if np.ndim(x) else x
+
+    return jax.tree.map(taken_apart, tree)
+
+
 def add(tree: Tree, other: Tree) -> Tree:
     """The sum of two vectors, or of any two trees of the same structure, leaf by leaf."""
     return jax.tree.map(operator.add, tree, other)
+
+
+def chosen(condition: Any, a: Tree, b: Tree) -> Tree:
+    """One of two vectors, or of any two trees of the same structure."""
+    return jax.tree.map(functools.partial(jnp.where, condition), a, b)
 
 
 def scaled(factor: Any, a: Vector) -> Vector:
@@ -33,6 +49,12 @@ def combined(x: Any, a: Vector, y: Any, b: Vector) -> Vector:
 def dot(a: Vector, b: Vector) -> Any:
     """The inner product a·b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def unit(a: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The vector, of any number of components, scaled to unit length."""
+    length = jnp.sqrt(sum(x * x for x in a))
+    return tuple(x / length for x in a)
 
 
 def cross(a: Vector, b: Vector) -> Vector:
@@ -116,15 +138,3 @@ def conjugate(quaternion: Quaternion) -> Quaternion:
     """The opposite turn."""
     q1, q2, q3, qs = quaternion
     return -q1, -q2, -q3, qs
-
-
-def normalized(quaternion: Quaternion) -> Quaternion:
-    """The quaternion at unit length."""
-    q1, q2, q3, qs = quaternion
-    factor = 1 / jnp.sqrt(q1 * q1 + q2 * q2 + q3 * q3 + qs * qs)
-    return q1 * factor, q2 * factor, q3 * factor, qs * factor
-
-
-def chosen(condition: Any, tree: Tree, other: Tree) -> Tree:
-    """One of two trees, leaf by leaf."""
-    return jax.tree.map(lambda x, y: jnp.where(condition, x, y), tree, other)

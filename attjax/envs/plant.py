@@ -19,6 +19,7 @@ from attjax.dynamics.equations import Kinematics, PrincipalTerms, TensorTerms, a
 from attjax.dynamics.forced_motion import ForcedEquations, ForcedState, Held
 from attjax.dynamics.fused_loop import apart, together
 from attjax.dynamics.integration import AgentStep
+from attjax.dynamics.noise import Noise
 from attjax.dynamics.sensing import Seen, Sensing
 from attjax.spacecraft import INTEGRATION_STEP
 
@@ -72,11 +73,13 @@ class Plant(struct.PyTreeNode):
         start = ForcedState(tuple(quaternion), tuple(angular_velocity), phasor, _unseen(samples))
         equations = self._equations(agent_step, (time + 0.5) * period)._replace(samples=samples)
         change: Any = integration.change(agent_step, start, equations, limit)
-        end = _attained(start, change.quaternion, change.angular_velocity)
+        end = _attained(start, *change[:2])
         plant = self.replace(queue=self.queue.later(rk4_steps))
         if self.sensing is not None:
-            seen = _attained(start, *(x or y for x, y in zip(change.seen, change[:2])))
-            plant = plant.replace(sensing=self.sensing.after(seen, end, times, self._draws(time)))
+            sampled = tuple(x or y for x, y in zip(change.seen, change[:2]))
+            seen, there = (Seen(*add(start[:2], x)) for x in (sampled, change[:2]))
+            sensing = self.sensing.after(seen, there, times, Noise.of(self.key, time))
+            plant = plant.replace(sensing=sensing)
         return *end, plant
 
     def _draws(self, time):

@@ -3,10 +3,12 @@
 import math
 
 import chex
+import jax
 import jax.numpy as jnp
 
 from attjax.dynamics.clock import Clock
 from attjax.dynamics.draws import Draws
+from attjax.dynamics.noise import Noise
 from attjax.dynamics.sensing import Seen, Sensing
 from attjax.dynamics.sensors import Gyro, StarTracker
 from attjax.spacecraft import INTEGRATION_STEP
@@ -37,7 +39,8 @@ def drawn_sensing(
     given = sensors.star_tracker, sensors.gyro
     tracker = None if given[0] is None else _tracker(given[0], draws)
     gyro = None if given[1] is None else _gyro(given[1], draws, period)
-    return Sensing.begun((tracker, gyro), state, draws)
+    noise = Noise.of(jax.random.key_data(draws.key), -1)  # before any agent step
+    return Sensing.begun((tracker, gyro), state, noise)
 
 
 def clock_of(sensor: telling.Gyro | telling.StarTracker) -> Clock:

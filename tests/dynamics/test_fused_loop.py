@@ -58,6 +58,23 @@ def test_more_results_than_operands(call):
     assert {name: x.item() for name, x in powers.items()} == {"self": 3, "square": 9, "cube": 27}
 
 
+@BOTH
+def test_operands_and_results_of_several_types(call):
+    """Each in its own, in whatever order, and where no operand is of a result's type."""
+
+    def function(words, x, count):
+        return {"is_odd": words[0] % 2 == 1, "x": x * 2, "word": words[0] + words[1], "n": -count}
+
+    words = jnp.uint32(2**32 - 1), jnp.uint32(3)
+    found = call(function, words, jnp.float32(1.5), jnp.int32(7))
+    assert {name: x.item() for name, x in found.items()} == {
+        "is_odd": True,
+        "x": 3.0,
+        "word": 2,
+        "n": -7,
+    }
+
+
 @pytest.mark.parametrize("order", ["left", "right", "tree", "started everywhere"])
 def test_in_whatever_order_a_device_reduces_the_function_is_applied_once(order):
     """The function of a result would be another, and so would that of the zeros at the start."""

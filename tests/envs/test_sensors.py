@@ -189,3 +189,33 @@ def test_the_observation_is_what_is_measured():
         true = np.rad2deg(Rotation.from_quat(state.quaternion).magnitude())
         shown = float(info["outcome"]["terminal_error_deg"])
         assert min(abs(shown - true), abs(360 - shown - true)) < 1e-2
+
+
+NOISY = {
+    "gyro": {"angle_random_walk_deg_per_root_h": 0.1},
+    "star_tracker": {"cross_boresight_arcsec": 5, "rate_hz": 4},
+}
+
+
+def told_rate(rate, **sensors):
+    """What a gyro says of it an agent step later."""
+    env = AttitudeEnv(5, world=sensing(**sensors))
+    params = env.default_params
+    state = env.reset(jax.random.key(0), params)[1].replace(angular_velocity=rate)
+    return measured(env.step_env(jax.random.key(0), state, 1, params)[1]).angular_velocity
+
+
+def test_a_sensors_noise_does_not_change_with_what_else_a_world_has():
+    alone, among = (told_rate(jnp.zeros(3), **x) for x in ({"gyro": NOISY["gyro"]}, NOISY))
+    np.testing.assert_array_equal(alone, among)
+
+
+def test_derivatives_pass_through_sensors():
+    slope = jax.jacfwd(lambda rate: told_rate(rate, **NOISY))(jnp.zeros(3))
+    np.testing.assert_allclose(slope, np.eye(3), atol=0.01)
+
+
+@pytest.mark.parametrize("platform", ["cpu", "cuda"])
+def test_sensors_are_lowered_for_each_device(platform):
+    step = jax.jit(jax.vmap(lambda rate: told_rate(rate, **NOISY))).trace(jnp.zeros((4, 3)))
+    assert step.lower(lowering_platforms=(platform,)).as_text()
