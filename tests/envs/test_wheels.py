@@ -140,7 +140,7 @@ def test_a_motor_pushes_the_body_by_as_much_as_commanded(x64):
 
 
 def test_a_motor_has_a_most_torque_and_a_dead_band(x64):
-    limits = {"most_torque": 0.004, "dead_band": 0.002}
+    limits = {"most_torque": 0.004, "dead_band": 0.003}
     speed, _ = spun([2, 8, 1], motors=limits)  # 0.01, 0.001 and −0.01 N m of the motor
     expected = 0.004 * 6 * STEP * QUICKER * np.array([1, 1, 0])
     np.testing.assert_allclose(speed, expected, rtol=0, atol=1e-12)
