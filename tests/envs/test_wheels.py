@@ -58,6 +58,9 @@ def test_wheels_and_disturbances_are_as_by_dop853(x64, inertia, held, delay):
     after = flown(env, state, actions)
     gains = np.linalg.norm(state.plant.actuators.directions, axis=1)
     assert np.ptp(gains) > 0.1
+    believed = env.default_params.torque_table[1:9:2] / levels[0]
+    cosines = np.sum(believed * np.array(state.plant.wheels.axes), axis=1)
+    np.testing.assert_allclose(np.degrees(np.arccos(cosines)), 5, rtol=1e-9)
 
     def motors(n, speeds):
         turn, late = divmod(n - delay, 6)
