@@ -165,6 +165,12 @@ class Spacecraft:
         return 1 + 2 * len(self.torque_levels) * len(self.torque_axes)
 
     @property
+    def least_moment(self) -> float:
+        """The least principal moment of inertia, kg m²."""
+        is_tensor = isinstance(self.inertia[0], tuple)
+        return min(_principal_moments(self.inertia) if is_tensor else self.inertia)
+
+    @property
     def torque_table(self) -> list[list[float]]:
         """The torque of each action, N m, body frame, in the order of Table 1."""
         axes = [[x / math.hypot(*axis) for x in axis] for axis in self.torque_axes]

@@ -59,6 +59,8 @@ def test_the_same_seed_is_the_same_world(folder, capsys):
         "[uncertainty]\ninertia_factor = 1.1\n",
         "[actuators]\ndelay = 3\n",
         "[sensors.gyro]\nresolution = 1e-6\n",
+        "[actuators.wheels]\ninertia = 1e-3\n",
+        "[disturbances.flexible]\nfrequency = 0.5\nparticipation = 0.1\n",
     ],
 )
 def test_a_world_with_one_part_flies(tmp_path, capsys, content):
@@ -76,6 +78,7 @@ def test_a_world_with_one_part_flies(tmp_path, capsys, content):
         ("[actuators]\ndelay = 10500\n", "they must be at most 10499"),
         ("[actuators]\ndead_levels = [7]\n", "LM50 has 3 torque_levels"),
         ("[sensors.gyro]\nresolution = -1\n", "sensors.gyro.resolution is -1"),
+        ("[actuators.wheels]\ninertia = 0.1\n", "wheels comes to 0.3; it must be below"),
         ("[sensors\n", "is no TOML"),
     ],
 )

@@ -8,7 +8,7 @@ from attjax.config.presets import PRECISE, PRESETS
 from attjax.config.settings import Settings
 from attjax.errors import UserError
 from attjax.spacecraft import LM50, Spacecraft
-from attjax.world import IDEAL, World
+from attjax.world import IDEAL, World, check_moving
 
 DEFAULT_PRESET = "precise"
 CUSTOM = "custom"
@@ -50,11 +50,14 @@ def check_world(world: World, spacecraft: Spacecraft) -> None:
     """Check that a spacecraft can fly in a world.
 
     Raises:
-        ValueError: its episode is shorter than a delay, it lacks a level or an axis, or the world
-            has what no file can describe.
+        ValueError: its episode is shorter than a delay, it lacks a level or an axis, its inertia
+            is not enough for what moves aboard, or the world has what no file can describe.
     """
     if world.own_disturbances:
         raise ValueError("a world with own_disturbances cannot be kept with a run")
+    factor = 1.0 if world.uncertainty is None else world.uncertainty.least_factor
+    axes = max(3, len(spacecraft.torque_axes))  # continuous actions have the body's
+    check_moving(world.wheels, world.flexible, axes, factor * spacecraft.least_moment)
     actuators = world.actuators
     if actuators is None:
         return

@@ -7,6 +7,7 @@ from flax import struct
 
 from attjax.dynamics.draws import Draws
 from attjax.dynamics.forced_motion import Pulse
+from attjax.dynamics.moving_parts import Motors
 from attjax.world.distributions import Number
 
 
@@ -39,6 +40,7 @@ class Actuators(struct.PyTreeNode):
         dead_levels: that give nothing from ``fault_time`` on, counted from 0.
         minimum_impulse: N m s.
         granularity: of the time that the largest torque is on, s.
+        motors: of reaction wheels; None: the torque comes from outside.
     """
 
     directions: chex.Array
@@ -49,9 +51,10 @@ class Actuators(struct.PyTreeNode):
     dead_levels: tuple[int, ...] = struct.field(pytree_node=False, default=())
     minimum_impulse: float = struct.field(pytree_node=False, default=0.0)
     granularity: float = struct.field(pytree_node=False, default=0.0)
+    motors: Motors | None = None
 
     def torque(self, commands: Commands, time: chex.Numeric) -> chex.Array:
-        """The torque (3,) that comes of a command, body frame, N m.
+        """The torque that comes of a command, N m: (3,) body frame, or (axes,) of wheels.
 
         Args:
             commands: what was asked for.
@@ -70,6 +73,8 @@ class Actuators(struct.PyTreeNode):
             amounts = jnp.where(is_enough, amounts, 0)
         if self.faults is not None:
             amounts = jnp.where(time >= self.fault_time, self.faults * amounts, amounts)
+        if self.motors is not None:
+            return self.motors.torques(amounts)
         return jnp.sum(amounts[:, None] * self.directions, axis=0)
 
     def delay_of(self, draws: Draws) -> chex.Numeric:
@@ -89,7 +94,7 @@ class Queue(struct.PyTreeNode):
 
     Attributes:
         starts: (pulses,) RK4 step in which each begins, counted from the next decision.
-        torques: (pulses, 3) body frame, N m.
+        torques: (pulses, 3) body frame, or (pulses, axes) of wheels, N m.
     """
 
     starts: chex.Array
@@ -115,7 +120,9 @@ LONG_AGO = -1e6
 """RK4 steps: when what stands in a queue at an episode's start began."""
 
 
-def empty_queue(most_delay: int, rk4_steps: int, held: bool, dtype: chex.ArrayDType) -> Queue:
+def empty_queue(
+    most_delay: int, rk4_steps: int, held: bool, dtype: chex.ArrayDType, size: int = 3
+) -> Queue:
     """A queue long enough for commands that come up to ``most_delay`` RK4 steps late.
 
     Args:
@@ -123,10 +130,11 @@ def empty_queue(most_delay: int, rk4_steps: int, held: bool, dtype: chex.ArrayDT
         rk4_steps: the least of an agent step.
         held: whether a torque lasts until the next, which must then still be known.
         dtype: of its numbers.
+        size: components of a torque.
 
     Example:
         >>> [len(empty_queue(n, 6, False, float).starts) for n in (0, 5, 6)]
         [1, 1, 2]
     """
     count = most_delay // rk4_steps + (2 if held else 1)
-    return Queue(jnp.full(count, LONG_AGO, dtype), jnp.zeros((count, 3), dtype))
+    return Queue(jnp.full(count, LONG_AGO, dtype), jnp.zeros((count, size), dtype))

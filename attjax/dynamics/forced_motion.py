@@ -1,4 +1,4 @@
-"""The equations of motion in a world that is not perfect: late pulses, disturbances.
+"""The equations of motion in a world that is not perfect: late pulses, disturbances, wheels.
 
 They have the methods of :class:`attjax.dynamics.equations.EquationsOfMotion`, so that the same
 loop integrates them. What a world lacks is None here, and nothing of it is compiled.
@@ -12,9 +12,10 @@ import jax
 import jax.numpy as jnp
 
 from attjax.dynamics import vectors
+from attjax.dynamics.bodies import BodyWithParts, RigidBody
 from attjax.dynamics.disturbances import Acting, OwnDisturbance
-from attjax.dynamics.equations import Kinematics, PrincipalTerms, TensorTerms
-from attjax.dynamics.vectors import Matrix, Vector
+from attjax.dynamics.equations import Kinematics
+from attjax.dynamics.vectors import Vector
 from attjax.spacecraft import INTEGRATION_STEP
 
 
@@ -26,12 +27,14 @@ class ForcedState(NamedTuple):
         phasor: cosine and sine of a swinging torque's phase; None where none swings.
         seen: what sensors have sampled in the agent step: changes of quaternion and angular
             velocity from its start; None where they sample at its end.
+        aboard: of what moves aboard, as the body has it; None where nothing does.
     """
 
     quaternion: tuple
     angular_velocity: Vector
     phasor: tuple[Any, Any] | None
     seen: tuple[Any, ...] = (None, None)
+    aboard: tuple[Any, ...] | None = None
 
 
 class Pulse(NamedTuple):
@@ -39,15 +42,15 @@ class Pulse(NamedTuple):
 
     Attributes:
         start: the RK4 step, counted from the beginning of this agent step, in which it begins.
-        torque: body frame, N m.
+        torque: body frame, or of reaction wheels along each one's axis, N m.
     """
 
     start: Any
-    torque: Vector
+    torque: tuple[Any, ...]
 
 
-def torque_during(pulses: tuple[Pulse, ...], held: bool, number: Any) -> Vector:
-    """The torque in one RK4 step, N m, body frame.
+def torque_during(pulses: tuple[Pulse, ...], held: bool, number: Any) -> tuple[Any, ...]:
+    """The torque in one RK4 step, N m, of as many components as the pulses'.
 
     Args:
         pulses: in the order in which they were commanded; if they are held, the first has begun.
@@ -85,20 +88,19 @@ class ForcedEquations(NamedTuple):
     Attributes:
         pulses: commanded torques.
         held: whether these are held.
-        gyroscopic: the terms of −I⁻¹ (ω × Iω).
-        inverse: I⁻¹, rows or diagonal, 1/(kg m²).
+        body: that they turn.
         acting: what else acts during the agent step.
         swinging: a torque's amplitude, body frame, N m, and angular rate, rad/s.
         own: disturbances of a user's own.
         kinematics: of the attitude.
         samples: after how many RK4 steps star tracker and gyro sample; None: at the end.
-        torque: of pulses and of what acts in this RK4 step, N m; None before :meth:`during`.
+        torque: in this RK4 step, of pulses, but of wheels', and of what acts, body frame, N m; None
+            before :meth:`during`, or where there is none.
     """
 
     pulses: tuple[Pulse, ...]
     held: Held
-    gyroscopic: PrincipalTerms | TensorTerms
-    inverse: Matrix | Vector
+    body: RigidBody | BodyWithParts
     acting: Acting
     swinging: tuple[Vector, Any] | None
     own: tuple[OwnDisturbance, ...]
@@ -122,11 +124,15 @@ class ForcedEquations(NamedTuple):
         What acts does so as at the attitude in the step's middle: of one that turns by φ
         meanwhile it is off by φ²/6, and to find it at each stage takes 1.7 times as long.
         """
+        commanded = torque_during(self.pulses, self.held.value, number)
+        body: Any = self.body  # of whose kind the state is
+        torque, body = body.during(commanded, state.aboard)
         turn = self.kinematics.rate(state.quaternion, state.angular_velocity)
         middle = vectors.add(state.quaternion, tuple(INTEGRATION_STEP / 2 * x for x in turn))
-        torque = torque_during(self.pulses, self.held.value, number)
-        acting = self.acting.torque(middle)
-        return self._replace(torque=torque if acting is None else vectors.add(torque, acting))
+        found = [x for x in (torque, self.acting.torque(middle)) if x is not None]
+        return self._replace(
+            torque=functools.reduce(vectors.add, found) if found else None, body=body
+        )
 
     def after(self, number: Any, change: ForcedState) -> ForcedState:
         """The change from the agent step's start to that RK4 step's end, and what is seen then."""
@@ -149,11 +155,9 @@ class ForcedEquations(NamedTuple):
             (cosine, sine), (amplitude, rate) = state.phasor, self.swinging
             torques.append(vectors.scaled(sine, amplitude))
             phasor_rate = -rate * sine, rate * cosine
-        torque = functools.reduce(vectors.add, [x for x in torques if x is not None])
-        acceleration = vectors.add(
-            self.gyroscopic.acceleration(state.angular_velocity),
-            vectors.times(self.inverse, torque),
-        )
+        found = [x for x in torques if x is not None]
+        body: Any = self.body
+        acceleration, moving = body.rate(found, state.angular_velocity, state.aboard)
         rates = self.kinematics.rate(state.quaternion, state.angular_velocity)
         still = jax.tree.map(jnp.zeros_like, state.seen)
-        return ForcedState(rates, acceleration, phasor_rate, still)
+        return ForcedState(rates, acceleration, phasor_rate, still, moving)

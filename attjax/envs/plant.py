@@ -10,15 +10,17 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from attjax.dynamics import integration, rigid_body
+from attjax.dynamics import integration
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics.actuators import Actuators, Queue
+from attjax.dynamics.bodies import body_of
 from attjax.dynamics.disturbances import Disturbances, Orbit
 from attjax.dynamics.draws import Draws
-from attjax.dynamics.equations import Kinematics, PrincipalTerms, TensorTerms, add
+from attjax.dynamics.equations import Kinematics, add
 from attjax.dynamics.forced_motion import ForcedEquations, ForcedState, Held
 from attjax.dynamics.fused_loop import apart, together
 from attjax.dynamics.integration import AgentStep
+from attjax.dynamics.moving_parts import FlexibleMode, Wheels
 from attjax.dynamics.noise import Noise
 from attjax.dynamics.sensing import Seen, Sensing
 from attjax.spacecraft import INTEGRATION_STEP
@@ -29,13 +31,15 @@ class Plant(struct.PyTreeNode):
 
     Attributes:
         key: of what is random in each step, as data of a JAX key.
-        inertia: (3,) principal moments or (3, 3) tensor, kg m².
+        inertia: (3,) principal moments or (3, 3) tensor, kg m², with all that moves aboard.
         actuators: what becomes of commands; None: just what they say.
         queue: of pulses on their way.
         orbit: None in a world without one.
         disturbances: what else acts.
         own: disturbances of a user's own.
         sensing: sensors and what they say; None: the truth is told.
+        wheels, wheel_speeds: reaction wheels, and (axes,) their speeds against the body, rad/s.
+        flexible, deflection: an appendage's mode, and (2,) its η and η̇.
     """
 
     key: chex.Array
@@ -46,6 +50,10 @@ class Plant(struct.PyTreeNode):
     disturbances: Disturbances
     own: tuple[Any, ...]
     sensing: Sensing | None = None
+    wheels: Wheels | None = None
+    wheel_speeds: chex.Array | None = None
+    flexible: FlexibleMode | None = None
+    deflection: chex.Array | None = None
 
     def moved(
         self,
@@ -70,11 +78,15 @@ class Plant(struct.PyTreeNode):
         times = time * rk4_steps, (time + 1) * rk4_steps
         samples = (None, None) if self.sensing is None else self.sensing.samples(times, dtype)
         phasor = self._phasor(time * period)
-        start = ForcedState(tuple(quaternion), tuple(angular_velocity), phasor, _unseen(samples))
+        body = tuple(quaternion), tuple(angular_velocity)
+        start = ForcedState(*body, phasor, _unseen(samples), self._aboard())
         equations = self._equations(agent_step, (time + 0.5) * period)._replace(samples=samples)
         change: Any = integration.change(agent_step, start, equations, limit)
         end = _attained(start, *change[:2])
         plant = self.replace(queue=self.queue.later(rk4_steps))
+        if start.aboard is not None:
+            moved = (x if x is None else jnp.stack(x) for x in add(start.aboard, change.aboard))
+            plant = plant.replace(**dict(zip(("wheel_speeds", "deflection"), moved)))
         if self.sensing is not None:
             sampled = tuple(x or y for x, y in zip(change.seen, change[:2]))
             seen, there = (Seen(*add(start[:2], x)) for x in (sampled, change[:2]))
@@ -92,19 +104,18 @@ class Plant(struct.PyTreeNode):
         _, rate, start = self.disturbances.swinging
         return jnp.cos(start + rate * time), jnp.sin(start + rate * time)
 
+    def _aboard(self):
+        if self.wheels is None and self.flexible is None:
+            return None
+        return tuple(x if x is None else tuple(x) for x in (self.wheel_speeds, self.deflection))
+
     def _equations(self, agent_step, middle):
-        gyroscopic: PrincipalTerms | TensorTerms
-        if self.inertia.ndim == 1:
-            gyroscopic, inverse = PrincipalTerms.of(self.inertia), tuple(1 / self.inertia)
-        else:
-            rows = rigid_body.inverse(self.inertia)
-            gyroscopic, inverse = TensorTerms.of(self.inertia, rows), tuple(map(tuple, rows))
+        body = body_of(self.inertia, self.wheels, self.flexible)
         swinging = self.disturbances.swinging
         return ForcedEquations(
             pulses=self.queue.pulses(),
             held=Held(agent_step.held),
-            gyroscopic=gyroscopic,
-            inverse=inverse,
+            body=body,
             acting=together(Disturbances.during, self.disturbances, self.orbit, middle),
             swinging=None if swinging is None else swinging[:2],
             own=self.own,
@@ -115,7 +126,8 @@ class Plant(struct.PyTreeNode):
         """The plant with one more pulse on its way.
 
         Args:
-            torque: (3,) that the actuators make of the command, N m, body frame.
+            torque: that the actuators make of the command, N m: (3,) body frame, or (axes,) of
+                wheels.
             time: agent steps since the start of the episode.
         """
         delay: chex.Numeric = 0

@@ -9,7 +9,7 @@ from attjax import checks
 from attjax.dynamics import propagation
 from attjax.dynamics.integration import AgentStep
 from attjax.envs.parameters import EnvParams, EnvState, check_params, default_params
-from attjax.envs.torques import acting_torque
+from attjax.envs.torques import actuated
 from attjax.values import check_share
 
 
@@ -52,7 +52,7 @@ def step(
     action = checks.decision(action, len(params.torque_table), actions)
     quaternion = checks.unit_quaternion("quaternion", state.quaternion)
     angular_velocity = checks.real("angular_velocity", state.angular_velocity, (3,))
-    torque = acting_torque(state, action, params, frameskip)
+    torque = actuated(state, action, params, frameskip)
     agent_step = AgentStep(frameskip, params.torque_held, kinematic_factor)
     moving = quaternion, angular_velocity, torque, params.inertia, params.frameskip
     have_values = all(map(checks.has_value, jax.tree.leaves((moving, state))))

@@ -126,11 +126,22 @@ def acting_torque(
 ) -> chex.Array:
     """The torque (3,) that comes of an action, N m, body frame: :func:`applied_torque`, ideally.
 
+    Of reaction wheels it is their motors', friction and the limit of their speed left out.
+
     Args:
         state: before the step.
         action, params: as of :func:`applied_torque`.
         frameskip: as of :func:`step`.
     """
+    torque = actuated(state, action, params, frameskip)
+    wheels = None if state.plant is None else state.plant.wheels
+    return torque if wheels is None else jnp.stack(wheels.along_axes(torque))
+
+
+def actuated(
+    state: EnvState, action: chex.Numeric, params: EnvParams, frameskip: int
+) -> chex.Array:
+    """As :func:`acting_torque`; but (axes,) torques on the body along the axes of wheels."""
     actuators = None if state.plant is None else state.plant.actuators
     if actuators is None:
         return applied_torque(action, params)

@@ -25,6 +25,7 @@ from attjax.dynamics.draws import Draws
 from attjax.dynamics.sensing import Seen
 from attjax.envs.inertia import drawn_inertia
 from attjax.envs.keys import world_key
+from attjax.envs.moving_parts import drawn_flexible, drawn_motors, drawn_wheels
 from attjax.envs.parameters import EnvParams, EnvState, control_period
 from attjax.envs.plant import Plant
 from attjax.envs.sensors import drawn_sensing
@@ -72,15 +73,23 @@ def drawn_plant(
     orbit = _orbit(world, draws)
     most_delay = 0 if world.actuators is None else math.ceil(world.actuators.most_delay)
     least_steps = 1 + (frameskip if params.frameskip is None else 0)
+    gains, directions = _axes(world, draws, axes)
+    wheels, wheel_speeds = drawn_wheels(world.wheels, draws, directions)
+    flexible, deflection = drawn_flexible(world.flexible, draws)
+    size = 3 if wheels is None else len(axes)
     return Plant(
         key=jax.random.key_data(draws.key),
         inertia=inertia,
-        actuators=_actuators(world, draws, axes),
-        queue=empty_queue(most_delay, least_steps, params.torque_held, dtype),
+        actuators=_actuators(world, draws, gains, directions),
+        queue=empty_queue(most_delay, least_steps, params.torque_held, dtype, size),
         orbit=None if orbit is None else orbit[0],
         disturbances=_disturbances(world, draws, inertia, orbit),
         own=tuple(x.drawn(draws) for x in world.own_disturbances),
         sensing=drawn_sensing(world.sensors, draws, start, control_period(params, frameskip)),
+        wheels=wheels,
+        wheel_speeds=wheel_speeds,
+        flexible=flexible,
+        deflection=deflection,
     )
 
 
@@ -163,10 +172,11 @@ def _swinging(sinusoid, draws):
     return tuple(amplitude), rate, draws.angle("sinusoid.phase")
 
 
-def _actuators(world, draws, axes):
+def _axes(world, draws, axes):
+    """Gains (axes, 1) and directions (axes, 3) of the torque axes; None where they are ideal."""
     given = world.actuators
     if given is None:
-        return None
+        return None, None
     count = len(axes)
     directions = jnp.asarray(axes, draws.dtype)
     if given.misalignment_deg != 0:
@@ -175,14 +185,21 @@ def _actuators(world, draws, axes):
             draws.tilted(f"misalignment_deg.{n}", directions[n], angles[n]) for n in range(count)
         ]
         directions = jnp.stack(turned)
+    return draws.number("gain", given.gain, (count, 1)), directions
+
+
+def _actuators(world, draws, gains, directions):
+    given = world.actuators
+    if given is None:
+        return None
     faults = None
     if given.faulty_axes:
-        is_faulty = np.isin(np.arange(1, count + 1), given.faulty_axes)
+        is_faulty = np.isin(np.arange(1, len(directions) + 1), given.faulty_axes)
         faults = jnp.where(is_faulty, draws.number("fault_gain", given.fault_gain), 1)
     has_faults = given.dead_levels or given.faulty_axes
     has_delay = given.delay != 0
     return Actuators(
-        directions=draws.number("gain", given.gain, (count, 1)) * directions,
+        directions=gains * directions,
         faults=faults,
         fault_time=draws.number("fault_time", given.fault_time) if has_faults else None,
         delay=jnp.round(draws.number("delay", given.delay)) if has_delay else None,
@@ -190,4 +207,5 @@ def _actuators(world, draws, axes):
         dead_levels=tuple(level - 1 for level in given.dead_levels),
         minimum_impulse=given.minimum_impulse,
         granularity=given.on_time_granularity,
+        motors=drawn_motors(given.wheels, draws, gains[:, 0]),
     )

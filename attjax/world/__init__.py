@@ -6,6 +6,7 @@ This package imports nothing heavy, so that errors in a description are instant.
 from attjax.world.aboard import Actuators, Uncertainty
 from attjax.world.description import IDEAL, World, made_for, names
 from attjax.world.distributions import LogUniform, Normal, Uniform
+from attjax.world.moving import Flexible, Wheels, check_moving
 from attjax.world.outside import Disturbances, Drag, Orbit, RadiationPressure, Sinusoid
 from attjax.world.telling import Gyro, Sensors, StarTracker
 
@@ -14,6 +15,7 @@ __all__ = [
     "Actuators",
     "Disturbances",
     "Drag",
+    "Flexible",
     "Gyro",
     "LogUniform",
     "Normal",
@@ -24,7 +26,9 @@ __all__ = [
     "StarTracker",
     "Uncertainty",
     "Uniform",
+    "Wheels",
     "World",
+    "check_moving",
     "made_for",
     "names",
 ]

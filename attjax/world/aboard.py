@@ -5,7 +5,8 @@ from typing import Annotated
 
 from attjax.spacecraft import INTEGRATION_STEP
 from attjax.values import LARGEST, check_number, integer, shown
-from attjax.world.distributions import Number, largest
+from attjax.world.distributions import Number, largest, least
+from attjax.world.moving import Wheels
 from attjax.world.parts import Part, Range
 
 
@@ -24,6 +25,11 @@ class Uncertainty(Part):
     inertia_factor: Annotated[Number, Range(0.05, 20)] = 1.0
     moment_factor: Annotated[Number, Range(0.05, 20)] = 1.0
     axes_turned_deg: Annotated[Number, Range(0, 180)] = 0.0
+
+    @property
+    def least_factor(self) -> float:
+        """The least that the least moment can be multiplied by; a cut leaves it as it is."""
+        return least(self.inertia_factor) * least(self.moment_factor)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -44,6 +50,7 @@ class Actuators(Part):
         fault_time: s after the start from which on dead levels and faulty axes are so.
         delay: from command to torque, in RK4 steps of 1/240 s, rounded; one for each episode.
         delay_jitter: more of it, drawn for each command.
+        wheels: reaction wheels that give the torque; None: it comes from outside, as of thrusters.
     """
 
     gain: Annotated[Number, Range(0, 10)] = 1.0
@@ -56,6 +63,7 @@ class Actuators(Part):
     fault_time: Annotated[Number, Range(0, 1e6)] = 0.0
     delay: Annotated[Number, Range(0, 10_500)] = 0.0
     delay_jitter: Annotated[Number, Range(0, 10_500)] = 0.0
+    wheels: Wheels | None = None
 
     def __post_init__(self):
         super().__post_init__()

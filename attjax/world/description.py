@@ -8,6 +8,7 @@ from typing import Any, Self
 
 from attjax.spacecraft import LM50, Spacecraft, read_toml
 from attjax.world.aboard import Actuators, Uncertainty
+from attjax.world.moving import Flexible, Wheels
 from attjax.world.outside import Disturbances, Orbit
 from attjax.world.parts import Part
 from attjax.world.telling import Sensors
@@ -59,6 +60,16 @@ class World(Part):
         """Whether nothing in it differs from the paper's perfect world."""
         parts = self.sensors, self.actuators, self.disturbances, self.uncertainty
         return not self.own_disturbances and all(x is None or x == type(x)() for x in parts)
+
+    @property
+    def wheels(self) -> Wheels | None:
+        """Its reaction wheels; None where it has none."""
+        return None if self.actuators is None else self.actuators.wheels
+
+    @property
+    def flexible(self) -> Flexible | None:
+        """Its flexible appendage; None where it has none."""
+        return None if self.disturbances is None else self.disturbances.flexible
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:

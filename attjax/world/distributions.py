@@ -195,6 +195,11 @@ def check(name: str, number: Number, low: float, high: float) -> None:
         )
 
 
+def least(number: Number) -> float:
+    """The least that it can be."""
+    return number.support[0] if isinstance(number, Uniform | Normal) else number
+
+
 def largest(number: Number) -> float:
     """The most that it can be."""
     return number.support[1] if isinstance(number, Uniform | Normal) else number

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from attjax.values import check_truth
 from attjax.world.distributions import Number
+from attjax.world.moving import Flexible
 from attjax.world.parts import Part, Range, check_direction
 
 
@@ -80,6 +81,7 @@ class Disturbances(Part):
         constant_torque: N m, about ``constant_axis`` of the body, or one that is drawn uniformly.
         constant_axis: its direction.
         sinusoid: a torque that swings.
+        flexible: an appendage that swings.
     """
 
     gravity_gradient: bool = False
@@ -89,6 +91,7 @@ class Disturbances(Part):
     constant_torque: Annotated[Number, Range(0, 1e3)] = 0.0
     constant_axis: tuple[float, ...] | None = None
     sinusoid: Sinusoid | None = None
+    flexible: Flexible | None = None
 
     def __post_init__(self):
         super().__post_init__()

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from bodies import LM50, rotated_inertia
 from imperfect import Oracle, vector
-from worlds import EFFECTS, flown, plants, start, world
+from references import assert_same_attitude, basilisk, quaternions_of
+from worlds import EFFECTS, flight, flown, plants, start, world
 
 from attjax import AttitudeEnv, Spacecraft
 from attjax.world import World
@@ -31,6 +32,27 @@ def test_disturbances_are_those_of_the_textbooks(x64, effect, inertia):
     np.testing.assert_allclose(after.angular_velocity, rate, rtol=0, atol=1e-10)
     undisturbed = flown(AttitudeEnv(20, spacecraft=craft), state.replace(plant=None), actions)
     assert np.linalg.norm(after.angular_velocity - undisturbed.angular_velocity) > 1e-7
+
+
+@pytest.mark.parametrize("body", [0, 1], ids=["diagonal", "full"])
+def test_the_gravity_gradient_is_basilisks(x64, body):
+    """Ten seconds of a slow turn, of which it changes the rate by 1e-4 rad/s."""
+    mrp, rates = np.split(basilisk("gravity", body), 2, axis=1)
+    craft = Spacecraft(inertia=(LM50, rotated_inertia())[body].tolist())
+    env = AttitudeEnv(5, spacecraft=craft, world=world(disturbances=EFFECTS["gravity gradient"]))
+    state = env.reset(jax.random.key(0), env.default_params)[1]
+    node, ahead = (0.6, 0.0, 0.8), (0.48, 0.8, -0.36)
+    orbit = state.plant.orbit._replace(node=node, ahead=ahead, start=0.0)
+    attitudes = quaternions_of(mrp)
+    state = state.replace(
+        quaternion=jnp.asarray(attitudes[0]),
+        angular_velocity=jnp.asarray(rates[0]),
+        plant=state.plant.replace(orbit=jax.tree.map(jnp.asarray, orbit)),
+    )
+    after = flight(env, state, [0] * 400)
+    # 7e-14 rad/s, and 6e-13 of the attitude, which the two integrate in other variables.
+    np.testing.assert_allclose(after.angular_velocity[7::8], rates[1:], rtol=0, atol=5e-13)
+    assert_same_attitude(after.quaternion[7::8], attitudes[1:], 5e-12)
 
 
 def test_a_batch_and_an_accelerators_form_fly_alike():

@@ -1,7 +1,8 @@
-"""Rotation by SciPy, independent of the code under test."""
+"""Rotation by SciPy and by Basilisk, independent of the code under test."""
 
 import numpy as np
 from bodies import LM50
+from commands import ROOT
 from scipy.integrate import solve_ivp
 
 NO_TORQUE = np.zeros(3)
@@ -24,3 +25,22 @@ def reference(start, duration, torque=NO_TORQUE, inertia=LM50):
 
     solution = solve_ivp(rate, (0, duration), start, "DOP853", rtol=1e-13, atol=1e-15)
     return solution.y[:, -1]
+
+
+def basilisk(name, case):
+    """Rows of what tests/data/basilisk_<name>.py wrote, of one case: its first column, left out."""
+    file = ROOT / "tests" / "data" / f"basilisk_{name}.csv"
+    rows = np.loadtxt(file, delimiter=",", skiprows=1)
+    return rows[rows[:, 0] == case, 1:]
+
+
+def quaternions_of(mrp):
+    """Unit quaternions (n, 4), up to sign, of modified Rodrigues parameters (n, 3)."""
+    square = np.sum(mrp**2, axis=1, keepdims=True)
+    return np.hstack([2 * mrp, 1 - square]) / (1 + square)
+
+
+def assert_same_attitude(quaternion, expected, tolerance):
+    """Unit quaternions (n, 4) but for their signs."""
+    sign = np.sign(np.sum(expected * quaternion, axis=1, keepdims=True))
+    np.testing.assert_allclose(quaternion, sign * expected, rtol=0, atol=tolerance)

@@ -39,6 +39,18 @@ def flown(env, state, actions):
     return state
 
 
+def flight(env, state, actions):
+    """States after each of the actions."""
+
+    def step(state, action):
+        after = env.step_env(jax.random.key(0), state, action, env.default_params)[1]
+        return after, after
+
+    return jax.jit(lambda state, actions: jax.lax.scan(step, state, actions)[1])(
+        state, jnp.asarray(actions)
+    )
+
+
 def plants(env, count=4000):
     keys = jax.random.split(jax.random.key(5), count)
     return jax.jit(jax.vmap(lambda key: env.reset(key, env.default_params)[1].plant))(keys)

@@ -3,6 +3,8 @@
 DISTURBANCES = ["tests/envs/test_disturbances.py"]
 WORLDS = ["tests/envs/test_worlds.py"]
 SENSORS = ["tests/envs/test_sensors.py"]
+WHEELS = ["tests/envs/test_wheels.py"]
+FLEXIBLE = ["tests/envs/test_flexible.py"]
 WORLD_FAULTS = {
     "gravity gradient of the other sign": (
         "attjax/dynamics/disturbances.py", "vectors.cross(up, vectors.times(self.gravity[1], up))",
@@ -65,6 +67,102 @@ WORLD_FAULTS = {
         "attjax/envs/worlds.py",
         "inertia = drawn_inertia(world.uncertainty, draws, params.inertia)",
         "inertia = params.inertia", WORLDS,
+    ),
+    "a motor that pushes the wheel as the body": (
+        "attjax/dynamics/moving_parts.py", "self._torque(-torque, speed)",
+        "self._torque(torque, speed)", WHEELS,
+    ),
+    "friction that drives the wheel, Coulomb's": (
+        "attjax/dynamics/moving_parts.py", "motor - jnp.clip(stopping,",
+        "motor + jnp.clip(stopping,", WHEELS,
+    ),
+    "friction that drives the wheel, viscous": (
+        "attjax/dynamics/moving_parts.py", "x - self.viscous * speed",
+        "x + self.viscous * speed", WHEELS,
+    ),
+    "friction between the wheel and no body": (
+        "attjax/dynamics/moving_parts.py", "vectors.scaled(-1, self.along_axes(self._all(speeds)))",
+        "vectors.scaled(-1, self.along_axes(self.torques))", WHEELS,
+    ),
+    "Coulomb friction that reverses a wheel": (
+        "attjax/dynamics/moving_parts.py",
+        "stopping = self.inertia * speed / INTEGRATION_STEP + motor",
+        "stopping = speed / INTEGRATION_STEP**2",
+        WHEELS,
+    ),
+    "a saturated wheel that cannot slow down": (
+        "attjax/dynamics/moving_parts.py",
+        "(jnp.abs(speed) >= self.most_speed) & (motor * speed >= 0)",
+        "jnp.abs(speed) >= self.most_speed",
+        WHEELS,
+    ),
+    "a wheel that saturates in one sense only": (
+        "attjax/dynamics/moving_parts.py", "(jnp.abs(speed) >= self.most_speed)",
+        "(speed >= self.most_speed)", WHEELS,
+    ),
+    "most torque of the command before gains": (
+        "attjax/dynamics/moving_parts.py", "torques = jnp.stack(self.gains) * amounts",
+        "torques = amounts", WHEELS,
+    ),
+    "a dead band as wide again": (
+        "attjax/dynamics/moving_parts.py", "jnp.abs(torques) < self.dead_band",
+        "jnp.abs(torques) < 2 * self.dead_band", WHEELS,
+    ),
+    "wheels without gyroscopic torque": (
+        "attjax/dynamics/moving_parts.py", "vectors.scaled(self.inertia, self.along_axes(speeds))",
+        "vectors.scaled(0, self.along_axes(speeds))", WHEELS,
+    ),
+    "wheels' speeds against the stars": (
+        "attjax/dynamics/moving_parts.py", "inverse * torque - vectors.dot(axis, acceleration)",
+        "inverse * torque", WHEELS,
+    ),
+    "wheels' inertia beside the spacecraft's": (
+        "attjax/dynamics/moving_parts.py", "vectors.scaled(jnp.sqrt(self.inertia), axis)",
+        "vectors.scaled(0, axis)", WHEELS,
+    ),
+    "gyroscopic torque of the other sign": (
+        "attjax/dynamics/bodies.py", "vectors.cross(momentum, angular_velocity)",
+        "vectors.cross(angular_velocity, momentum)", WHEELS,
+    ),
+    "wheels where they are believed": (
+        "attjax/envs/worlds.py", "drawn_wheels(world.wheels, draws, directions)",
+        "drawn_wheels(world.wheels, draws, axes)", WHEELS,
+    ),
+    "wheels that rest at each agent step's start": (
+        "attjax/envs/plant.py", 'zip(("wheel_speeds", "deflection"), moved)',
+        'zip(("deflection",), [*moved][1:])', WHEELS,
+    ),
+    "revolutions a minute taken for rad/s": (
+        "attjax/envs/moving_parts.py", 'draws.number("wheels.most_speed", limit)',
+        'draws.number("wheels.most_speed", limit * math.pi / 30)', WHEELS,
+    ),
+    "a mode's momentum left out": (
+        "attjax/dynamics/moving_parts.py", "vectors.scaled(state[1], self.vector)",
+        "vectors.scaled(0 * state[1], self.vector)", FLEXIBLE,
+    ),
+    "a mode that is not driven by the body": (
+        "attjax/dynamics/moving_parts.py",
+        "-self._force(state) - vectors.dot(self.vector, acceleration)",
+        "-self._force(state)",
+        FLEXIBLE,
+    ),
+    "a mode that pulls the body the other way": (
+        "attjax/dynamics/moving_parts.py", "vectors.scaled(self._force(state), self.vector)",
+        "vectors.scaled(-self._force(state), self.vector)", FLEXIBLE,
+    ),
+    "hertz taken for rad/s": (
+        "attjax/envs/moving_parts.py", "rate = 2 * math.pi * frequency",
+        "rate = frequency", FLEXIBLE,
+    ),
+    "half of the damping": (
+        "attjax/envs/moving_parts.py", "2 * damping * rate", "damping * rate", FLEXIBLE,
+    ),
+    "a mode's share of the inertia left out": (
+        "attjax/dynamics/moving_parts.py", "return (self.vector,)", "return ()", FLEXIBLE,
+    ),
+    "a mode that is still at each agent step's start": (
+        "attjax/envs/plant.py", 'zip(("wheel_speeds", "deflection"), moved)',
+        'zip(("wheel_speeds",), moved)', FLEXIBLE,
     ),
 }  # fmt: skip
 """As faults.FAULTS."""

@@ -1,5 +1,6 @@
 """Descriptions of worlds: what they may be, what is said of what they may not be."""
 
+import contextlib
 import functools
 import math
 import tomllib
@@ -12,10 +13,12 @@ from hypothesis import strategies as st
 
 from attjax import Spacecraft, World
 from attjax.config import run, toml
-from attjax.world import IDEAL, Actuators, LogUniform, Normal, Uniform, distributions
+from attjax.world import IDEAL, Actuators, LogUniform, Normal, Uniform, Wheels, distributions
 
 EXAMPLE = ROOT / "docs" / "examples" / "leo.toml"
 ORBIT = {"altitude_km": 500}
+WHEEL = {"inertia": 1e-3}
+MODE = {"frequency": 1, "participation": 0.1}
 BAD = [
     ({"x": 1}, "has the unknown name 'x'"),
     ({"name": 3}, "name is 3"),
@@ -59,6 +62,21 @@ BAD = [
     ({"sensors": {"star_tracker": {"boresight": [0, 0, 0]}}}, "boresight is all zeros"),
     ({"sensors": {"sextant": {}}}, "sensors has the unknown name 'sextant'"),
     ({"uncertainty": {"moment_factor": [1, 2, 3]}}, "moment_factor is [1, 2, 3]"),
+    ({"actuators": {"wheels": {}}}, "actuators.wheels lacks inertia"),
+    ({"actuators": {"wheels": {"inertia": 0}}}, "actuators.wheels.inertia is 0; it must be from"),
+    ({"actuators": {"wheels": 3}}, "actuators.wheels is 3; it must be a table"),
+    ({"actuators": {"wheels": WHEEL | {"most_torque": 0}}}, "wheels.most_torque is 0; it must be"),
+    ({"actuators": {"wheels": WHEEL | {"most_speed": {"uniform": [1, 2]}}}}, "must be a number"),
+    ({"actuators": {"wheels": WHEEL | {"dead_band": -1}}}, "wheels.dead_band is -1; it must be"),
+    ({"actuators": {"wheels": WHEEL | {"coulomb_friction": -1}}}, "coulomb_friction is -1"),
+    (
+        {"actuators": {"wheels": WHEEL | {"viscous_friction": {"uniform": [0, 1]}}}},
+        "wheels.viscous_friction can be 1; it must be at most 0.24",
+    ),
+    ({"disturbances": {"flexible": {"frequency": 1}}}, "flexible lacks participation"),
+    ({"disturbances": {"flexible": MODE | {"frequency": 0}}}, "flexible.frequency is 0"),
+    ({"disturbances": {"flexible": MODE | {"damping": 2}}}, "flexible.damping is 2; it must be"),
+    ({"disturbances": {"flexible": MODE | {"axis": [0, 0, 0]}}}, "flexible.axis is all zeros"),
     ({"own_disturbances": [1]}, "own_disturbances can be given in Python only"),
     ([], "world is []; it must be a table"),
 ]
@@ -148,6 +166,46 @@ def test_what_the_spacecraft_lacks_is_named():
     run.check_world(World(actuators=Actuators(dead_levels=(3,))), Spacecraft())
 
 
+@pytest.mark.parametrize(
+    "table, said",
+    [
+        ({"actuators": {"wheels": {"inertia": 0.04}}}, "3 wheels comes to 0.12; it must be below"),
+        (
+            {"disturbances": {"flexible": MODE | {"participation": 0.34}}},
+            "participation can be 0.34, whose square is 0.1156; it must be below .* wheels, 0.115$",
+        ),
+        (
+            {"disturbances": {"flexible": MODE | {"participation": {"uniform": [0, 0.3]}}}}
+            | {"actuators": {"wheels": {"inertia": 0.009}}},
+            "whose square is 0.09; it must be below .* 0.088$",
+        ),
+        (
+            {"disturbances": {"flexible": MODE | {"participation": 0.3}}}
+            | {"uncertainty": {"inertia_factor": {"uniform": [0.5, 2]}}},
+            "must be below the spacecraft's least moment but for wheels, 0.0575$",
+        ),
+        (
+            {"disturbances": {"flexible": MODE | {"frequency": 30, "participation": 0.25}}},
+            "frequency can be 30; at this participation and damping it must be at most 25.8",
+        ),
+    ],
+)
+def test_what_moves_aboard_is_within_the_spacecrafts_inertia(table, said):
+    with pytest.raises(ValueError, match=said) as error:
+        run.new(world=World.from_lists(table))
+    assert "\n" not in str(error.value)
+
+
+def test_a_tensor_has_room_for_what_its_least_moment_has():
+    """Turned by an eighth about the last axis, moments 1 and 3 make 2 on the diagonal."""
+    craft = Spacecraft(inertia=((2, 1, 0), (1, 2, 0), (0, 0, 3)), torque_levels=(0.1,))
+    assert craft.least_moment == pytest.approx(1)
+    for inertia, is_enough in ((0.33, True), (0.34, False)):
+        world = World(actuators=Actuators(wheels=Wheels(inertia=inertia)))
+        with contextlib.nullcontext() if is_enough else pytest.raises(ValueError, match="least"):
+            run.check_world(world, craft)
+
+
 def test_support_is_what_can_be_drawn():
     for number, support in (
         (Uniform(1, 2), (1, 2)),
@@ -155,9 +213,10 @@ def test_support_is_what_can_be_drawn():
         (Normal(0, 1), (-math.inf, math.inf)),
         (Normal(0, 1, -1, 2), (-1, 2)),
     ):
-        assert number.support == support and distributions.largest(number) == support[1]
+        assert number.support == support
+        assert (distributions.least(number), distributions.largest(number)) == support
         assert distributions.from_table(distributions.to_table(number)) == number
-    assert distributions.largest(3.0) == 3.0
+    assert distributions.least(3.0) == distributions.largest(3.0) == 3.0
 
 
 def test_only_the_ideal_world_is_called_so():
