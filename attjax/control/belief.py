@@ -8,11 +8,13 @@ import jax.numpy as jnp
 
 from attjax.dynamics import integration, vectors
 from attjax.dynamics.actuators import Queue
+from attjax.dynamics.bodies import body_of
 from attjax.dynamics.disturbances import Acting
-from attjax.dynamics.equations import Kinematics, inertial_terms
+from attjax.dynamics.equations import Kinematics
 from attjax.dynamics.forced_motion import ForcedEquations, ForcedState, Held
 from attjax.dynamics.vectors import Quaternion, Vector
 from attjax.envs.context import Context
+from attjax.envs.torques import applied_torque, commanded
 from attjax.spacecraft import INTEGRATION_STEP
 
 
@@ -77,13 +79,13 @@ def _moved(estimate, queue, context, step):
         estimate.angular_velocity,
         None,
         tuple(None if x is None else (jnp.zeros_like(x),) * n for x, n in zip(samples, (4, 3))),
+        None if estimate.wheel_speeds is None else (estimate.wheel_speeds, None),
     )
-    gyroscopic, inverse = inertial_terms(context.inertia)
+    known = context.knowledge.wheels
     equations = ForcedEquations(
         pulses=queue.pulses(),
         held=Held(agent_step.held),
-        gyroscopic=gyroscopic,
-        inverse=inverse,
+        body=body_of(context.inertia, known and known.wheels),
         acting=Acting(None, None, estimate.torque),
         swinging=None,
         own=(),
@@ -118,4 +120,16 @@ def impulse(queue: Queue, context: Context) -> Vector:
         else:
             lasting = jnp.where((pulse.start >= 0) & (pulse.start < steps), 1, 0)
         given.append(vectors.scaled(lasting * INTEGRATION_STEP, pulse.torque))
-    return functools.reduce(vectors.add, given)
+    total = functools.reduce(vectors.add, given)
+    known = context.knowledge.wheels
+    return total if known is None else known.wheels.along_axes(total)
+
+
+def commanded_torque(action: chex.Numeric, context: Context) -> chex.Array:
+    """The torque (3,) that an action stands for, body frame, N m; of wheels, (axes,) along them."""
+    known = context.knowledge.wheels
+    if known is None:
+        return applied_torque(action, context)
+    axes = len(known.wheels.axes)
+    amounts = commanded(action, context, axes, context.torque_duration).amounts
+    return known.motors.torques(amounts)

@@ -33,6 +33,7 @@ class Estimate(struct.PyTreeNode):
         bias: of the gyro, rad/s; None: it has none.
         torque: that disturbs, body frame, N m; None: nothing does.
         covariance: of the error (θ, Δω, Δb, Δd); None where the truth is told.
+        wheel_speeds: of reaction wheels, rad/s, which are told; None: it has none.
     """
 
     quaternion: Quaternion
@@ -40,6 +41,7 @@ class Estimate(struct.PyTreeNode):
     bias: Vector | None
     torque: Vector | None
     covariance: Triangle | None
+    wheel_speeds: tuple[Any, ...] | None = None
 
 
 class Expected(struct.PyTreeNode):
@@ -70,6 +72,7 @@ def unknowing(context: Context) -> tuple[Estimate, Expected]:
         bias=None if rate is None or rate.bias is None else still,
         torque=None if is_told or known.torque is None else still,
         covariance=None,
+        wheel_speeds=None if known.wheels is None else (zero,) * len(known.wheels.wheels.axes),
     )
     if not is_told:
         size = linearized.size_of(estimate)
@@ -127,7 +130,8 @@ def corrected(
     """
     told = told_by(measurement, context)
     if estimate.covariance is None:
-        return estimate.replace(quaternion=told.quaternion, angular_velocity=told.angular_velocity)
+        return _as_told(estimate, told)
+    estimate = estimate.replace(wheel_speeds=told.wheel_speeds)
     noise = linearized.noise(context)
     return together(measured.correct, estimate, expected, told, noise)
 
@@ -135,18 +139,28 @@ def corrected(
 def begun(estimate: Estimate, measurement: Measurement, context: Context) -> Estimate:
     """The estimate after the first measurement, of attitude and rate both."""
     told = told_by(measurement, context)
-    first = estimate.replace(quaternion=told.quaternion, angular_velocity=told.angular_velocity)
+    first = _as_told(estimate, told)
     if estimate.covariance is None:
         return first
     return first.replace(covariance=measured.first_covariance(first, linearized.noise(context)))
 
 
+def _as_told(estimate, told):
+    return estimate.replace(
+        quaternion=told.quaternion,
+        angular_velocity=told.angular_velocity,
+        wheel_speeds=told.wheel_speeds,
+    )
+
+
 def told_by(measurement: Measurement, context: Context) -> Measurement:
     """A measurement by components, whether there is one as 1 or 0."""
     dtype = context.inertia.dtype
+    speeds = None if context.knowledge.wheels is None else measurement.wheel_speeds
     return Measurement(
         quaternion=tuple(measurement.quaternion),
         has_quaternion=jnp.asarray(measurement.has_quaternion, dtype),
         angular_velocity=tuple(measurement.angular_velocity),
         has_angular_velocity=jnp.asarray(measurement.has_angular_velocity, dtype),
+        wheel_speeds=None if speeds is None else tuple(speeds),
     )

@@ -18,7 +18,6 @@ from attjax.dynamics.actuators import Queue, empty_queue
 from attjax.dynamics.sensing import Measurement
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
-from attjax.envs.torques import applied_torque
 
 
 class Memory(struct.PyTreeNode):
@@ -63,7 +62,8 @@ class FlightLoop(struct.PyTreeNode):
             return None
         least_steps = 1 + (0 if context.steps_after is not None else context.agent_step.frameskip)
         held, dtype = context.agent_step.held, context.inertia.dtype
-        queue = empty_queue(known.delay, least_steps, held, dtype)
+        size = 3 if known.wheels is None else len(known.wheels.wheels.axes)
+        queue = empty_queue(known.delay, least_steps, held, dtype, size)
         return Memory(*estimator.unknowing(context), queue, jnp.zeros((), jnp.int32))
 
     def step(
@@ -107,7 +107,7 @@ class FlightLoop(struct.PyTreeNode):
         """The memory after an action; memory, action and context as of :meth:`step`."""
         if memory is None:
             return None
-        torque = applied_torque(action, context)
+        torque = belief.commanded_torque(action, context)
         queue = memory.queue.and_then(context.knowledge.delay, torque)
         return memory.replace(queue=queue, time=memory.time + 1)
 

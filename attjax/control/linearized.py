@@ -12,7 +12,7 @@ from attjax.control import belief, covariance
 from attjax.control.covariance import ONE, Triangle, product
 from attjax.dynamics import vectors
 from attjax.dynamics.actuators import Queue
-from attjax.dynamics.equations import inertial_terms
+from attjax.dynamics.bodies import body_of
 from attjax.dynamics.forced_motion import Held
 from attjax.dynamics.vectors import Matrix, Vector
 from attjax.envs.context import Context
@@ -68,7 +68,8 @@ def model(queue: Queue, context: Context) -> Model:
     rows = tuple(inertia) if inertia.ndim == 1 else tuple(map(tuple, inertia))
     impulse = belief.impulse(queue, context)
     turning = 2 * context.kinematic_factor
-    period, inverse = context.control_period, inertial_terms(inertia)[1]
+    period, wheels = context.control_period, context.knowledge.wheels
+    inverse = body_of(inertia, wheels and wheels.wheels).inverse
     numbers = rows, inverse, impulse, period, turning, _rounding(context), context.knowledge
     return Model(*_in_one_type((*numbers, Held(context.agent_step.held)), context))
 
@@ -166,7 +167,11 @@ def _transition(estimate, motion, rate, model):
     """The errors after a control period, a row each, by those before it."""
     period, inverse = model.period, _rows(model.inverse)
     turned = vectors.attitude_matrix(motion.turn)
-    slowed = _rate_transition(rate, model)
+    momentum = vectors.times(model.inertia, rate)
+    if model.knowledge.wheels is not None:
+        aboard = model.knowledge.wheels.wheels.momentum(estimate.wheel_speeds)
+        momentum = vectors.add(momentum, aboard)
+    slowed = _rate_transition(momentum, rate, model)
     half = model.turning * period / 2
     drifted = [[half * (turned[i][j] + slowed[i][j]) for j in AXES] for i in AXES]
     nothing: list[Any] = [None] * 3
@@ -183,9 +188,8 @@ def _transition(estimate, motion, rate, model):
     return rows
 
 
-def _rate_transition(rate, model):
-    """exp(A Δt) to second order, where A = I⁻¹ ((Iω)× − ω× I) by Eq. 6."""
-    momentum = vectors.times(model.inertia, rate)
+def _rate_transition(momentum, rate, model):
+    """exp(A Δt) to second order, where A = I⁻¹ (h× − ω× I) with the momentum h, by Eq. 6."""
     spun = [[product(row, column) for column in zip(*_rows(model.inertia))] for row in _skew(rate)]
     gyroscopic = [
         [_sum(x, _times(-1, y)) for x, y in zip(*rows)] for rows in zip(_skew(momentum), spun)

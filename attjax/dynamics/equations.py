@@ -17,7 +17,7 @@ import numpy as np
 
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
-from attjax.dynamics.vectors import Matrix, Vector, add
+from attjax.dynamics.vectors import Vector, add
 
 Products = tuple[chex.Array, chex.Array, chex.Array, chex.Array, chex.Array, chex.Array]
 
@@ -116,20 +116,6 @@ class Kinematics:
     def rate(self, quaternion: Sequence[Any], angular_velocity: Sequence[Any]) -> tuple:
         """The four components of q̇, 1/s, of those of q and of ω, rad/s."""
         return quaternions.derivative(quaternion, angular_velocity, self.factor)
-
-
-def inertial_terms(
-    inertia: chex.Array,
-) -> tuple[PrincipalTerms | TensorTerms, Matrix | Vector]:
-    """The gyroscopic terms of an inertia, (3,) or (3, 3), kg m², and I⁻¹, 1/(kg m²).
-
-    That is three rows; of principal moments the diagonal.
-    """
-    if inertia.ndim == 1:
-        return PrincipalTerms.of(inertia), tuple(1 / inertia)
-    rows = rigid_body.inverse(inertia)
-    by_rows: Any = tuple(map(tuple, rows))
-    return TensorTerms.of(inertia, rows), by_rows
 
 
 class EquationsOfMotion(NamedTuple):

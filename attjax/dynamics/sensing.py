@@ -26,12 +26,14 @@ class Measurement(struct.PyTreeNode):
         has_quaternion: whether it has been told since the last decision.
         angular_velocity: (3,) body frame, rad/s.
         has_angular_velocity: the same of it.
+        wheel_speeds: (axes,) of reaction wheels against the body, rad/s; None: it has none.
     """
 
     quaternion: chex.Array
     has_quaternion: chex.Array
     angular_velocity: chex.Array
     has_angular_velocity: chex.Array
+    wheel_speeds: chex.Array | None = None
 
 
 class Seen(NamedTuple):

@@ -108,7 +108,10 @@ class AttitudeEnv:
         """What a controller may know of this environment."""
         agent_step = AgentStep(self.frameskip, params.torque_held, self.kinematic_factor)
         told = self.observes_quaternion_rate, self._is_continuous
-        return believed(params, self.world, agent_step, *told)
+        axes = (
+            worlds.torque_axes(params, self.spacecraft, self.actions) if self.world.wheels else None
+        )
+        return believed(params, self.world, agent_step, axes, told)
 
     def reset(
         self, key: chex.PRNGKey, params: EnvParams | None = None

@@ -61,15 +61,17 @@ def believed(
     params: EnvParams,
     world: World,
     agent_step: AgentStep,
-    observes_quaternion_rate: bool,
-    continuous: bool,
+    axes: chex.Array | None,
+    told: tuple[bool, bool],
 ) -> Context:
     """The context of a spacecraft in a world.
 
     Args:
         params: of the spacecraft, as believed.
         world: that it flies in.
-        agent_step, observes_quaternion_rate, continuous: as of :class:`Context`.
+        agent_step: as of :class:`Context`.
+        axes: (axes, 3) unit vectors of the torque axes, body frame, where they have wheels.
+        told: ``observes_quaternion_rate`` and ``continuous``, as of :class:`Context`.
     """
     period = control_period(params, agent_step.frameskip)
     return Context(
@@ -78,9 +80,9 @@ def believed(
         torque_table=params.torque_table,
         rate_limit=params.rate_limit,
         torque_duration=period if params.torque_held else INTEGRATION_STEP,
-        knowledge=knowledge(world, params.inertia, period),
+        knowledge=knowledge(world, params.inertia, period, axes),
         steps_after=params.frameskip,
         agent_step=agent_step,
-        observes_quaternion_rate=observes_quaternion_rate,
-        continuous=continuous,
+        observes_quaternion_rate=told[0],
+        continuous=told[1],
     )

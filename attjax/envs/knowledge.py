@@ -4,7 +4,7 @@ All of it follows from the world's description: a flight loop has no numbers set
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import chex
 import jax.numpy as jnp
@@ -12,6 +12,7 @@ from flax import struct
 
 from attjax.dynamics.clock import Clock
 from attjax.dynamics.disturbances import EARTH_DIPOLE, EARTH_MU, EARTH_RADIUS, SOLAR_PRESSURE
+from attjax.dynamics.moving_parts import Motors, Wheels
 from attjax.dynamics.vectors import Vector
 from attjax.envs.sensors import ALLAN_TOP, ARCSEC, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, PPM, clock_of
 from attjax.spacecraft import INTEGRATION_STEP
@@ -83,6 +84,13 @@ class TorqueNoise(struct.PyTreeNode):
     walk: chex.Numeric
 
 
+class KnownWheels(NamedTuple):
+    """Reaction wheels as they are believed to be, and their motors."""
+
+    wheels: Wheels
+    motors: Motors
+
+
 class Knowledge(struct.PyTreeNode):
     """What is known of a world; by default that of one where the truth is told at once.
 
@@ -92,6 +100,7 @@ class Knowledge(struct.PyTreeNode):
         torque: None: nothing disturbs.
         along, across: standard deviations of a torque, as shares of it.
         inertia: of a moment of inertia, as a share of it.
+        wheels: None: it has none.
         delay: from a command to its torque, RK4 steps; known when it is compiled.
     """
 
@@ -101,6 +110,7 @@ class Knowledge(struct.PyTreeNode):
     along: chex.Numeric = 0.0
     across: chex.Numeric = 0.0
     inertia: chex.Numeric = 0.0
+    wheels: KnownWheels | None = None
     delay: int = struct.field(pytree_node=False, default=0)
 
     @property
@@ -109,13 +119,16 @@ class Knowledge(struct.PyTreeNode):
         return self.attitude is None and self.rate is None and self.delay == 0
 
 
-def knowledge(world: World, inertia: chex.Array, period: chex.Numeric) -> Knowledge:
+def knowledge(
+    world: World, inertia: chex.Array, period: chex.Numeric, axes: chex.Array | None = None
+) -> Knowledge:
     """What is known of a world; nothing of one where the truth is told and torques come at once.
 
     Args:
         world: its description.
         inertia: as believed, (3,) or (3, 3), kg m².
         period: time between two decisions, s.
+        axes: (axes, 3) unit vectors of the torque axes, body frame, where they have wheels.
 
     Example:
         >>> from attjax.world import Actuators
@@ -138,8 +151,26 @@ def knowledge(world: World, inertia: chex.Array, period: chex.Numeric) -> Knowle
         along=math.hypot(along, inertia_error),
         across=across,
         inertia=inertia_error,
+        wheels=_wheels(world.wheels, axes),
         delay=delay,
     )
+
+
+def _wheels(given, axes):
+    if given is None:
+        return None
+    coulomb, viscous, band = (
+        moments(x)[0] for x in (given.coulomb_friction, given.viscous_friction, given.dead_band)
+    )
+    wheels = Wheels(
+        axes=tuple(map(tuple, axes)),
+        inertia=jnp.asarray(moments(given.inertia)[0], axes.dtype),
+        most_speed=given.most_speed,
+        coulomb=coulomb or None,
+        viscous=viscous or None,
+    )
+    ones = (jnp.ones((), axes.dtype),) * len(axes)
+    return KnownWheels(wheels, Motors(ones, given.most_torque, band or None))
 
 
 def _root_mean_square(number):

@@ -63,10 +63,11 @@ def measured(state: EnvState) -> Measurement:
         >>> measured(state).quaternion.tolist()
         [0.0, 0.0, 0.0, 1.0]
     """
-    if state.plant is None or state.plant.sensing is None:
-        always = jnp.asarray(True)
-        return Measurement(state.quaternion, always, state.angular_velocity, always)
-    return state.plant.sensing.told
+    plant = state.plant
+    if plant is not None and plant.sensing is not None:
+        return plant.sensing.told.replace(wheel_speeds=plant.wheel_speeds)
+    always, speeds = jnp.asarray(True), None if plant is None else plant.wheel_speeds
+    return Measurement(state.quaternion, always, state.angular_velocity, always, speeds)
 
 
 def default_params(frameskip: int = 20, spacecraft: Spacecraft = LM50) -> EnvParams:

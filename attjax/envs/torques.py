@@ -94,7 +94,7 @@ def torque_axes(params: EnvParams, spacecraft: Spacecraft, actions: str) -> chex
 
 
 def commanded(
-    action: chex.Numeric, params: EnvParams, count: int, duration: chex.Numeric
+    action: chex.Numeric, params: EnvParams | Context, count: int, duration: chex.Numeric
 ) -> Commands:
     """What an action asks of the actuators.
 
