@@ -124,8 +124,8 @@ def covariance_after(estimate: Any, motion: belief.Motion, model: Model) -> Tria
         if known.rate is not None and estimate.bias is not None:
             added[6 + i, 6 + i] = known.rate.walk**2 * period + turning[i]
         if known.torque is not None and estimate.torque is not None:
-            walk = known.torque.walk + known.torque.walk_per_radian * _length(rate)
-            added[size - 3 + i, size - 3 + i] = walk * period
+            walk = known.torque.walk(_length(rate)) * period
+            added[size - 3 + i, size - 3 + i] = walk
     return covariance.propagated(before, _transition(estimate, motion, rate, model), added)
 
 

@@ -11,13 +11,13 @@ import jax.numpy as jnp
 from flax import struct
 
 from attjax.dynamics.clock import Clock
-from attjax.dynamics.disturbances import EARTH_DIPOLE, EARTH_MU, EARTH_RADIUS, SOLAR_PRESSURE
 from attjax.dynamics.moving_parts import Motors, Wheels
 from attjax.dynamics.vectors import Vector
 from attjax.envs.sensors import ALLAN_TOP, ARCSEC, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, PPM, clock_of
+from attjax.envs.torque_noise import TorqueNoise, torque_noise
 from attjax.spacecraft import INTEGRATION_STEP
 from attjax.world import World
-from attjax.world.distributions import moments
+from attjax.world.distributions import moments, root_mean_square
 
 
 class AttitudeNoise(struct.PyTreeNode):
@@ -68,20 +68,6 @@ class RateNoise(struct.PyTreeNode):
         total = grown[0] + grown[1] + grown[2]
         along, across = self.along**2, self.across**2
         return [along * x + across * (total - x) for x in grown]
-
-
-class TorqueNoise(struct.PyTreeNode):
-    """Of the disturbances together.
-
-    Attributes:
-        variance: about each axis, N² m².
-        walk_per_radian: what it changes by as the body turns, N² m² rad⁻¹.
-        walk: what it changes by as time passes, N² m² s⁻¹.
-    """
-
-    variance: chex.Numeric
-    walk_per_radian: chex.Numeric
-    walk: chex.Numeric
 
 
 class KnownWheels(NamedTuple):
@@ -147,7 +133,7 @@ def knowledge(
     return Knowledge(
         attitude=None if tracker is None else _attitude_noise(tracker),
         rate=None if gyro is None else _rate_noise(gyro, period),
-        torque=_torque_noise(world, inertia),
+        torque=torque_noise(world, inertia, period),
         along=math.hypot(along, inertia_error),
         across=across,
         inertia=inertia_error,
@@ -173,10 +159,6 @@ def _wheels(given, axes):
     return KnownWheels(wheels, Motors(ones, given.most_torque, band or None))
 
 
-def _root_mean_square(number):
-    return math.sqrt(moments(number)[1])
-
-
 def _deviation_from_one(number):
     mean, square = moments(number)
     return math.sqrt(max(square - 2 * mean + 1, 0))
@@ -191,7 +173,7 @@ def _delay(actuators):
 def _torque_errors(actuators):
     if actuators is None:
         return 0.0, 0.0
-    angle = math.radians(_root_mean_square(actuators.misalignment_deg))
+    angle = math.radians(root_mean_square(actuators.misalignment_deg))
     return _deviation_from_one(actuators.gain), angle / 2**0.5
 
 
@@ -199,13 +181,13 @@ def _inertia_error(uncertainty):
     if uncertainty is None:
         return 0.0
     factors = uncertainty.inertia_factor, uncertainty.moment_factor
-    turned = math.radians(_root_mean_square(uncertainty.axes_turned_deg))
+    turned = math.radians(root_mean_square(uncertainty.axes_turned_deg))
     return math.hypot(*map(_deviation_from_one, factors), min(turned, 1))
 
 
 def _attitude_noise(tracker):
     across, about = (
-        ARCSEC * _root_mean_square(x) for x in (tracker.cross_boresight_arcsec, tracker.roll_arcsec)
+        ARCSEC * root_mean_square(x) for x in (tracker.cross_boresight_arcsec, tracker.roll_arcsec)
     )
     return AttitudeNoise(across, about, tracker.boresight, clock_of(tracker))
 
@@ -213,11 +195,11 @@ def _attitude_noise(tracker):
 def _rate_noise(gyro, period):
     clock = clock_of(gyro)
     interval = clock.period * INTEGRATION_STEP if clock.period else period
-    white = DEG_PER_ROOT_HOUR * _root_mean_square(gyro.angle_random_walk_deg_per_root_h)
-    fixed = DEG_PER_HOUR * _root_mean_square(gyro.bias_deg_per_h) / 3**0.5
-    wandering = DEG_PER_HOUR / ALLAN_TOP * _root_mean_square(gyro.bias_instability_deg_per_h)
-    along = PPM * _root_mean_square(gyro.scale_factor_ppm)
-    across = ARCSEC * _root_mean_square(gyro.misalignment_arcsec) / 2**0.5
+    white = DEG_PER_ROOT_HOUR * root_mean_square(gyro.angle_random_walk_deg_per_root_h)
+    fixed = DEG_PER_HOUR * root_mean_square(gyro.bias_deg_per_h) / 3**0.5
+    wandering = DEG_PER_HOUR / ALLAN_TOP * root_mean_square(gyro.bias_instability_deg_per_h)
+    along = PPM * root_mean_square(gyro.scale_factor_ppm)
+    across = ARCSEC * root_mean_square(gyro.misalignment_arcsec) / 2**0.5
     has_bias = any(x > 0 for x in (fixed, wandering, along, across))
     return RateNoise(
         sample=jnp.sqrt(white**2 / interval + gyro.resolution**2 / 12),
@@ -228,42 +210,3 @@ def _rate_noise(gyro, period):
         limit=gyro.rate_limit,
         clock=clock,
     )
-
-
-def _torque_noise(world, inertia):
-    """Of directions that are uniform, a torque a × f has ²⁄₉ a² f² about each axis."""
-    given = world.disturbances
-    if given is None or given == type(given)():
-        return None
-    fixed = moments(given.constant_torque)[1] / 3
-    turning, orbital_rate = 0.0, 0.0
-    if world.orbit is not None:
-        radius = EARTH_RADIUS + 1e3 * moments(world.orbit.altitude_km)[0]
-        orbital_rate = math.sqrt(EARTH_MU / radius) / radius
-        field = EARTH_DIPOLE * (EARTH_RADIUS / radius) ** 3
-        turning += 4 / 9 * moments(given.residual_dipole)[1] * field**2  # B² is 2 B₀² on average
-        if given.drag is not None:
-            speed = orbital_rate * radius
-            turning += 2 / 9 * (speed**2 / 2) ** 2 * _mean_square(given.drag, "density")
-        if given.gravity_gradient:
-            turning = turning + _gravity_gradient(orbital_rate, inertia)
-    if given.radiation_pressure is not None:
-        turning = turning + 2 / 9 * SOLAR_PRESSURE**2 * _mean_square(given.radiation_pressure)
-    swinging, swing = 0.0, 0.0
-    if given.sinusoid is not None:
-        swinging = moments(given.sinusoid.torque)[1] / 6
-        swing = 2 * math.pi / moments(given.sinusoid.period)[0]
-    walk = 2 * (turning * 2 * orbital_rate + swinging * swing)
-    return TorqueNoise(fixed + turning + swinging, 2 * turning, walk)
-
-
-def _mean_square(part, *more):
-    names = "area", "coefficient", "lever_arm", *more
-    return math.prod(moments(getattr(part, name))[1] for name in names)
-
-
-def _gravity_gradient(rate, inertia):
-    """Mean square about an axis of 3 n² r̂ × I r̂ for uniform r̂: n⁴ (3 tr I² − (tr I)²)/5."""
-    squared = jnp.sum(inertia**2)
-    trace = jnp.sum(inertia) if inertia.ndim == 1 else jnp.trace(inertia)
-    return rate**4 * (3 * squared - trace**2) / 5

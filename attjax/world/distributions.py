@@ -208,3 +208,8 @@ def largest(number: Number) -> float:
 def moments(number: Number) -> tuple[float, float]:
     """The means of it and of its square."""
     return number.moments if isinstance(number, Uniform | Normal) else (number, number**2)
+
+
+def root_mean_square(number: Number) -> float:
+    """The root of its square's mean."""
+    return math.sqrt(moments(number)[1])
