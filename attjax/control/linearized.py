@@ -52,7 +52,7 @@ class Noise(NamedTuple):
     Attributes:
         attitude, rate: as of :class:`Knowledge`.
         torque: variance of a disturbance at the start, N² m²; None where there is none.
-        rounding, turning: as of :class:`Model`.
+        rounding, turning, period: as of :class:`Model`.
     """
 
     attitude: AttitudeNoise | None
@@ -60,6 +60,7 @@ class Noise(NamedTuple):
     torque: Any
     rounding: Any
     turning: Any
+    period: Any
 
 
 def model(queue: Queue, context: Context) -> Model:
@@ -78,7 +79,8 @@ def noise(context: Context) -> Noise:
     """The noise of what is measured."""
     known, turning = context.knowledge, 2 * context.kinematic_factor
     torque = None if known.torque is None else known.torque.variance
-    of_this = known.attitude, known.rate, torque, _rounding(context), turning
+    period = context.control_period
+    of_this = known.attitude, known.rate, torque, _rounding(context), turning, period
     return Noise(*_in_one_type(of_this, context))
 
 

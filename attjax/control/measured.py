@@ -94,9 +94,19 @@ def _angles(estimate, expected, told, noise):
         if turned is not None:
             row = [product(axis, turned[k]) for k in AXES]
             slow = [-noise.turning * expected.age * x for x in row]
+            variance = variance + _turned_since(row, estimate, expected, noise)
         row = row + slow + [None] * (size_of(estimate) - 6)
         numbers.append(Scalar(row, product(axis, angle), variance, told.has_quaternion))
     return numbers
+
+
+def _turned_since(row, estimate, expected, noise):
+    """Variance of the attitude that the rate's errors since a sample have added, so far as they are
+    other ones at each decision: what is the same all the time is in the row.
+    """
+    lag = noise.turning**2 * expected.age * noise.period
+    spread = [covariance.at(estimate.covariance, 3 + i, 3 + i) for i in AXES]
+    return lag * product([x * x for x in row], spread)
 
 
 def frame(noise: Noise) -> list[list[Any]]:

@@ -7,7 +7,7 @@ from attjax.evaluation.robustness import Flights, wilson
 from attjax.evaluation.tables import console
 
 HEADS = ("", "success (%)", "overspeed (%)", "rms (°)", "max (°)", "believed", "settling", "N m s")
-WIDTHS = (20, 19, 18, 10, 9, 9, 9, 6)
+WIDTHS = (19, 19, 18, 9, 9, 9, 9, 6)
 NOTE = """\
 Success and overspeed with 95 % intervals (Wilson). rms and max: error angle over the last fifth of
 the slews that kept the rate limit. believed: rms, in degrees, of what was taken for the attitude,
