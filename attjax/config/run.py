@@ -53,8 +53,8 @@ def check_world(world: World, spacecraft: Spacecraft) -> None:
         ValueError: its episode is shorter than a delay, it lacks a level or an axis, its inertia
             is not enough for what moves aboard, or the world has what no file can describe.
     """
-    if world.own_disturbances:
-        raise ValueError("a world with own_disturbances cannot be kept with a run")
+    if world.own_parts:
+        raise ValueError(f"a world with {world.own_parts[0]} cannot be kept with a run")
     factor = 1.0 if world.uncertainty is None else world.uncertainty.least_factor
     axes = max(3, len(spacecraft.torque_axes))  # continuous actions have the body's
     check_moving(world.wheels, world.flexible, axes, factor * spacecraft.least_moment)

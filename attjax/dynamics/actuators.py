@@ -1,5 +1,7 @@
 """From a command to the pulse that comes of it: gains, faults, granularity and delay."""
 
+from typing import Protocol
+
 import chex
 import jax.numpy as jnp
 import numpy as np
@@ -87,6 +89,18 @@ class Actuators(struct.PyTreeNode):
         if self.jitter == 0:
             return fixed
         return fixed + jnp.round(draws.number("delay_jitter", self.jitter))
+
+
+class OwnActuator(Protocol):
+    """An actuator of a user's own: a tree of numbers with this method."""
+
+    def torque(self, torque: chex.Array, time: chex.Numeric) -> chex.Array:
+        """What becomes of a torque (3,), body frame, N m; of wheels, of (axes,) along them.
+
+        Args:
+            torque: that the world's actuators would give.
+            time: since the start of the episode, s.
+        """
 
 
 class Queue(struct.PyTreeNode):

@@ -4,7 +4,7 @@ A sensor samples at multiples of its period since the episode's start, and what 
 told at the first decision after its latency.
 """
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import chex
 import jax.numpy as jnp
@@ -34,6 +34,19 @@ class Measurement(struct.PyTreeNode):
     angular_velocity: chex.Array
     has_angular_velocity: chex.Array
     wheel_speeds: chex.Array | None = None
+
+
+class OwnSensor(Protocol):
+    """A sensor of a user's own: a tree of numbers with this method."""
+
+    def told(self, measurement: Measurement, state: Any, key: chex.PRNGKey) -> Measurement:
+        """What is told at a decision.
+
+        Args:
+            measurement: that the world's sensors tell.
+            state: the true :class:`attjax.EnvState`.
+            key: of this decision.
+        """
 
 
 class Seen(NamedTuple):

@@ -1,6 +1,7 @@
 """One spacecraft: its state, its parameters and what they may be (Table 1, section 2.3)."""
 
 import chex
+import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import struct
@@ -63,11 +64,16 @@ def measured(state: EnvState) -> Measurement:
         >>> measured(state).quaternion.tolist()
         [0.0, 0.0, 0.0, 1.0]
     """
-    plant = state.plant
-    if plant is not None and plant.sensing is not None:
-        return plant.sensing.told.replace(wheel_speeds=plant.wheel_speeds)
-    always, speeds = jnp.asarray(True), None if plant is None else plant.wheel_speeds
-    return Measurement(state.quaternion, always, state.angular_velocity, always, speeds)
+    always, plant = jnp.asarray(True), state.plant
+    told = Measurement(state.quaternion, always, state.angular_velocity, always)
+    if plant is None:
+        return told
+    told = told if plant.sensing is None else plant.sensing.told
+    told = told.replace(wheel_speeds=plant.wheel_speeds)
+    for number, sensor in enumerate(plant.own_sensors):
+        key = jax.random.fold_in(jax.random.wrap_key_data(plant.key), state.time)
+        told = sensor.told(told, state, jax.random.fold_in(key, number))
+    return told
 
 
 def default_params(frameskip: int = 20, spacecraft: Spacecraft = LM50) -> EnvParams:

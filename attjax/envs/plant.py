@@ -36,7 +36,7 @@ class Plant(struct.PyTreeNode):
         queue: of pulses on their way.
         orbit: None in a world without one.
         disturbances: what else acts.
-        own: disturbances of a user's own.
+        own_disturbances, own_actuators, own_sensors: of a user's own.
         sensing: sensors and what they say; None: the truth is told.
         wheels, wheel_speeds: reaction wheels, and (axes,) their speeds against the body, rad/s.
         flexible, deflection: an appendage's mode, and (2,) its η and η̇.
@@ -48,7 +48,9 @@ class Plant(struct.PyTreeNode):
     queue: Queue
     orbit: Orbit | None
     disturbances: Disturbances
-    own: tuple[Any, ...]
+    own_disturbances: tuple[Any, ...] = ()
+    own_actuators: tuple[Any, ...] = ()
+    own_sensors: tuple[Any, ...] = ()
     sensing: Sensing | None = None
     wheels: Wheels | None = None
     wheel_speeds: chex.Array | None = None
@@ -118,7 +120,7 @@ class Plant(struct.PyTreeNode):
             body=body,
             acting=together(Disturbances.during, self.disturbances, self.orbit, middle),
             swinging=None if swinging is None else swinging[:2],
-            own=self.own,
+            own=self.own_disturbances,
             kinematics=Kinematics(agent_step.kinematic_factor),
         )
 

@@ -142,10 +142,13 @@ def actuated(
     state: EnvState, action: chex.Numeric, params: EnvParams, frameskip: int
 ) -> chex.Array:
     """As :func:`acting_torque`; but (axes,) torques on the body along the axes of wheels."""
-    actuators = None if state.plant is None else state.plant.actuators
-    if actuators is None:
-        return applied_torque(action, params)
-    period = control_period(params, frameskip)
-    duration = period if params.torque_held else INTEGRATION_STEP
-    commands = commanded(action, params, len(actuators.directions), duration)
-    return actuators.torque(commands, state.time * period)
+    plant, period = state.plant, control_period(params, frameskip)
+    if plant is None or plant.actuators is None:
+        torque = applied_torque(action, params)
+    else:
+        duration = period if params.torque_held else INTEGRATION_STEP
+        commands = commanded(action, params, len(plant.actuators.directions), duration)
+        torque = plant.actuators.torque(commands, state.time * period)
+    for actuator in () if plant is None else plant.own_actuators:
+        torque = actuator.torque(torque, state.time * period)
+    return torque

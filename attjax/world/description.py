@@ -13,6 +13,8 @@ from attjax.world.outside import Disturbances, Orbit
 from attjax.world.parts import Part
 from attjax.world.telling import Sensors
 
+OWN = "own_disturbances", "own_actuators", "own_sensors"
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class World(Part):
@@ -21,9 +23,12 @@ class World(Part):
     Attributes:
         name: for people; one that is not ideal is not called so, but "unnamed".
         orbit, sensors, actuators, disturbances, uncertainty: its parts.
-        own_disturbances: of a user's own, in Python only: hashable, with a method ``drawn(draws)``
-            that makes an :class:`attjax.dynamics.disturbances.OwnDisturbance` for an episode, of
-            its :class:`attjax.dynamics.draws.Draws`.
+        own_disturbances, own_actuators, own_sensors: of a user's own, in Python only: hashable,
+            with a method ``drawn(draws)`` that makes for an episode, of its
+            :class:`attjax.dynamics.draws.Draws`, an
+            :class:`attjax.dynamics.disturbances.OwnDisturbance`, an
+            :class:`attjax.dynamics.actuators.OwnActuator` or an
+            :class:`attjax.dynamics.sensing.OwnSensor`.
 
     Raises:
         ValueError: a value is not as its part says, or a disturbance needs an orbit.
@@ -41,6 +46,8 @@ class World(Part):
     disturbances: Disturbances | None = None
     uncertainty: Uncertainty | None = None
     own_disturbances: tuple[Any, ...] = ()
+    own_actuators: tuple[Any, ...] = ()
+    own_sensors: tuple[Any, ...] = ()
 
     def __post_init__(self):
         super().__post_init__()
@@ -59,7 +66,12 @@ class World(Part):
     def is_ideal(self) -> bool:
         """Whether nothing in it differs from the paper's perfect world."""
         parts = self.sensors, self.actuators, self.disturbances, self.uncertainty
-        return not self.own_disturbances and all(x is None or x == type(x)() for x in parts)
+        return not self.own_parts and all(x is None or x == type(x)() for x in parts)
+
+    @property
+    def own_parts(self) -> list[str]:
+        """Names of what is a user's own."""
+        return [name for name in OWN if getattr(self, name)]
 
     @property
     def wheels(self) -> Wheels | None:
@@ -88,8 +100,9 @@ class World(Part):
         Raises:
             ValueError: a name is unknown or missing, or a value is not as said.
         """
-        if isinstance(values, dict) and values.get("own_disturbances"):
-            raise ValueError("own_disturbances can be given in Python only")
+        own = [name for name in OWN if isinstance(values, dict) and values.get(name)]
+        if own:
+            raise ValueError(f"{own[0]} can be given in Python only")
         try:
             return cls.from_table(values, "world")
         except ValueError as error:

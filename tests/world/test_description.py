@@ -78,6 +78,7 @@ BAD = [
     ({"disturbances": {"flexible": MODE | {"damping": 2}}}, "flexible.damping is 2; it must be"),
     ({"disturbances": {"flexible": MODE | {"axis": [0, 0, 0]}}}, "flexible.axis is all zeros"),
     ({"own_disturbances": [1]}, "own_disturbances can be given in Python only"),
+    ({"own_sensors": [1]}, "own_sensors can be given in Python only"),
     ([], "world is []; it must be a table"),
 ]
 
