@@ -78,7 +78,7 @@ def _add_conditions(group):
     )
     craft_help = (
         "TOML file of the spacecraft that flies (default: the one that the policy was trained on; "
-        "LM50 for a classical controller)"
+        "for a classical controller the named world's, else LM50)"
     )
     group.add_argument("--spacecraft", type=command_line.path, metavar="FILE", help=craft_help)
     command_line.add_world(group, "that of the policy's training; ideal for a classical controller")
@@ -114,8 +114,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         trained = config.settings.task.frameskips if config else None
         if arguments.frameskip is None:
             arguments.frameskip = fields.frameskip_to_judge(trained or ())
-        spacecraft = evaluation_subject.spacecraft(arguments, config)
-        env = evaluation_subject.env(arguments, config, spacecraft)
+        world = evaluation_subject.world(arguments, config)
+        spacecraft = evaluation_subject.spacecraft(arguments, config, world)
+        env = evaluation_subject.env(arguments, config, spacecraft, world)
         controllers = {name: _flown(name, arguments, env, config) for name in names}
         if arguments.json not in (None, STDOUT):
             destinations.check("--json", arguments.json)

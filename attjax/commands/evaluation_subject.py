@@ -9,8 +9,8 @@ from attjax import errors
 from attjax.config import run as run_config
 from attjax.config import toml
 from attjax.runs import folder as run_folder
-from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
-from attjax.world import IDEAL
+from attjax.spacecraft import INTEGRATION_STEP, Spacecraft
+from attjax.world import IDEAL, World, made_for
 
 if TYPE_CHECKING:
     from attjax.envs.attitude import AttitudeEnv
@@ -56,8 +56,23 @@ def complete(arguments: argparse.Namespace) -> None:
             raise errors.UserError(f"--{flag} does not go with --robustness")
 
 
-def spacecraft(arguments: argparse.Namespace, config: run_config.Config | None) -> Spacecraft:
+def world(arguments: argparse.Namespace, config: run_config.Config | None) -> World:
+    """The world that was asked for, or that of the training.
+
+    Raises:
+        UserError: there is no such world.
+    """
+    if arguments.world is not None:
+        return toml.read_world(arguments.world)
+    return config.world if config else IDEAL
+
+
+def spacecraft(
+    arguments: argparse.Namespace, config: run_config.Config | None, world: World
+) -> Spacecraft:
     """What flies, with the duration that was asked for.
+
+    Without a file and a policy it is what the world was described for.
 
     Raises:
         UserError: its file cannot be read or describes none, or the duration is too short.
@@ -65,7 +80,7 @@ def spacecraft(arguments: argparse.Namespace, config: run_config.Config | None) 
     if arguments.spacecraft is not None:
         craft = toml.read_spacecraft(arguments.spacecraft)
     else:
-        craft = config.spacecraft if config else LM50
+        craft = config.spacecraft if config else made_for(world)
     if arguments.duration is not None:
         try:
             craft = dataclasses.replace(craft, duration=arguments.duration)
@@ -84,21 +99,19 @@ def _check_duration(duration, frameskip):
 
 
 def env(
-    arguments: argparse.Namespace, config: run_config.Config | None, spacecraft: Spacecraft
+    arguments: argparse.Namespace,
+    config: run_config.Config | None,
+    spacecraft: Spacecraft,
+    world: World,
 ) -> "AttitudeEnv":
     """The simulator that all controllers fly, by the rules of the policy's training.
 
-    It flies in the world that was asked for, or in that of the training.
-
     Raises:
-        UserError: there is no such world, or the spacecraft cannot fly in it.
+        UserError: the spacecraft cannot fly in the world.
     """
     # Imported late: with it, --help and errors in the arguments would take seconds.
     from attjax.runs import build
 
-    world = config.world if config else IDEAL
-    if arguments.world is not None:
-        world = toml.read_world(arguments.world)
     with errors.one_line_errors(ValueError):
         run_config.check_world(world, spacecraft)
     rules = {"actions": arguments.actions or "discrete"}
