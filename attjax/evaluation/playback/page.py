@@ -67,12 +67,7 @@ def page(
         "slews": _slew_names(start),
         "flights": _encoded([_samples(start, history) for history in histories]),
     }
-    if not env.world.is_ideal:
-        content["world"] = env.world.name
-        if env.actions == "discrete":
-            content["leastTorque"] = _least_torque(params.torque_table)
-    if not truth_is_told(env, params):
-        content["beliefs"] = _encoded([history.believed for history in histories])
+    content |= _of_world(env, params, histories)
     scripts = "\n".join(resources.read(f"{TEMPLATES}/{name}.js") for name in SCRIPTS)
     # "<" would let a name end the element that holds it.
     flights = json.dumps(content).replace("<", "\\u003c")
@@ -88,10 +83,17 @@ def _starts(env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey) -> EnvState:
     return jax.tree.map(lambda *x: jnp.concatenate(x), tests, random)
 
 
-def _least_torque(table):
-    """The smallest about an axis that can be commanded, N m."""
-    torques = np.abs(table)
-    return float(torques[torques > 0].min(initial=torques.max()))
+def _of_world(env, params, histories):
+    """What the page holds of a world, nothing of the ideal one."""
+    content = {}
+    if not env.world.is_ideal:
+        content["world"] = env.world.name
+        if env.actions == "discrete":  # the weakest that can be commanded about an axis, N m
+            torques = np.abs(params.torque_table)
+            content["leastTorque"] = float(torques[torques > 0].min(initial=torques.max()))
+    if not truth_is_told(env, params):
+        content["beliefs"] = _encoded([history.believed for history in histories])
+    return content
 
 
 def _slew_names(start):
