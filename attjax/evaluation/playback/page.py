@@ -66,8 +66,7 @@ def page(
         "controllers": list(controllers),
         "slews": _slew_names(start),
         "flights": _encoded([_samples(start, history) for history in histories]),
-    }
-    content |= _of_world(env, params, histories)
+    } | _of_world(env, params, histories)
     scripts = "\n".join(resources.read(f"{TEMPLATES}/{name}.js") for name in SCRIPTS)
     # "<" would let a name end the element that holds it.
     flights = json.dumps(content).replace("<", "\\u003c")
