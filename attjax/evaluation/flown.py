@@ -79,12 +79,13 @@ def estimated(memory: Memory | None, states: EnvState) -> chex.Array:
 
 def estimation_error(memory: Memory | None, states: EnvState) -> chex.Array:
     """(slews,) angle between what is believed at a decision and the truth, rad."""
+    return jax.vmap(angle_between)(estimated(memory, states), states.quaternion)
 
-    def angle(quaternion, true):
-        between = vectors.then(vectors.conjugate(tuple(quaternion)), tuple(true))
-        return quaternions.error_angle(jnp.stack([*between[:3], jnp.abs(between[3])]))
 
-    return jax.vmap(angle)(estimated(memory, states), states.quaternion)
+def angle_between(believed: chex.Array, true: chex.Array) -> chex.Array:
+    """Angle of the turn between two attitudes, (4,) quaternions of either sign, rad."""
+    between = vectors.then(vectors.conjugate(tuple(believed)), tuple(true))
+    return quaternions.error_angle(jnp.stack([*between[:3], jnp.abs(between[3])]))
 
 
 def step(

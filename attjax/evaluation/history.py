@@ -62,3 +62,14 @@ def record(
         return (memory, observation, state), history
 
     return jax.lax.scan(step, (memory, observation, start), jnp.arange(steps))[1]
+
+
+def estimation_errors(start: EnvState, history: History) -> chex.Array:
+    """(steps, slews) angle between what was believed at each decision and the truth then, rad.
+
+    Args:
+        start: of the slews, as :func:`record` was given it.
+        history: of them.
+    """
+    true = jnp.concatenate([start.quaternion[None], history.quaternion[:-1]])
+    return jax.vmap(jax.vmap(flown.angle_between))(history.believed, true)

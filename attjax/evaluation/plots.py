@@ -1,83 +1,19 @@
 """Figures of an evaluation, written as PNG files. Needs the extra ``plot`` (matplotlib)."""
 
-import dataclasses
-import functools
 from pathlib import Path
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from attjax import canvas, evaluation
 from attjax.control import time_optimal
-from attjax.dynamics import quaternion as quaternions
-from attjax.envs.attitude import AttitudeEnv
-from attjax.envs.parameters import EnvParams, EnvState
 from attjax.evaluation import paper
-from attjax.evaluation.episodes import Episodes
-from attjax.evaluation.flown import Controller
-from attjax.evaluation.history import History
-from attjax.evaluation.paper import PAPER_TABLE_2, is_the_papers
+from attjax.evaluation.flight import Flight, angles_deg
+from attjax.evaluation.paper import PAPER_TABLE_2
 
 STYLES = ("-", "--", "-.", ":")
 RANDOM_SLEWS = 200
 FINAL_SECONDS = 8.0
-
-
-def _angles_deg(quaternion):
-    flat = quaternion.reshape(-1, 4)
-    angles = jnp.rad2deg(jax.vmap(quaternions.error_angle)(flat))
-    return np.asarray(angles).reshape(quaternion.shape[:-1])
-
-
-@dataclasses.dataclass(frozen=True)
-class Flight:
-    """A controller, and the slews that it flies: those of :func:`attjax.evaluate`."""
-
-    controller: Controller
-    env: AttitudeEnv
-    params: EnvParams
-    seed: int
-    episodes: int
-
-    @property
-    def hz(self) -> str:
-        """The control rate, for titles."""
-        return f"{1 / self.env.control_period:.2f} Hz"
-
-    @property
-    def is_the_papers(self) -> bool:
-        """Whether the paper's results can stand beside this flight's."""
-        return is_the_papers(self.env.spacecraft, self.env.world.name)
-
-    @property
-    def goal_deg(self) -> float:
-        """The largest error angle that counts as pointing, degrees."""
-        return self.env.spacecraft.goal_angle_deg
-
-    @property
-    def starts(self) -> EnvState:
-        """The initial states of the flown slews."""
-        key = jax.random.key(self.seed)
-        return evaluation.random_slews(self.env, self.params, key, self.episodes)[1]
-
-    @functools.cached_property
-    def flown(self) -> Episodes:
-        """The outcome of its episodes."""
-        key = jax.random.key(self.seed)
-        return evaluation.fly(self.controller, self.env, self.params, key, self.episodes)
-
-    @functools.cached_property
-    def table_5(self) -> tuple[np.ndarray, History]:
-        """Time and history of Table 5's slews, which two figures show."""
-        return self.record(paper.table_5_slews())
-
-    def record(self, start: EnvState) -> tuple[np.ndarray, History]:
-        """Time in s, (steps,), and the history of slews from the given states."""
-        steps = int(self.params.max_steps_in_episode)
-        key = jax.random.key(self.seed)
-        history = evaluation.record(self.controller, self.env, self.params, key, start, steps)
-        return np.arange(1, steps + 1) * self.env.control_period, history
 
 
 def write_all(flight: Flight, folder: Path) -> list[Path]:
@@ -96,14 +32,16 @@ def write_all(flight: Flight, folder: Path) -> list[Path]:
 def slews(flight: Flight, folder: Path) -> list[Path]:
     """What the paper's Figs. 5–7 show, of Table 5's slews, and the torques chosen."""
     time, history = flight.table_5
-    paths = []
+    belief, paths = flight.belief(paper.table_5_slews(), history), []
     for index, name in enumerate(paper.TABLE_5):
         one = jax.tree.map(lambda x, index=index: np.asarray(x[:, index]), history)
         figure, axes = canvas.subplots(4, 1, figsize=(7, 9), sharex=True)
         _plot_components(axes[0], time, one.quaternion, ("q1", "q2", "q3", "q_s"))
         _plot_components(axes[2], time, one.angular_velocity, ("ω1", "ω2", "ω3"))
         _plot_pulses(axes[3], time, one.torque, flight.env.spacecraft)
-        axes[1].semilogy(time, _angles_deg(one.quaternion), "k", linewidth=1)
+        axes[1].semilogy(time, angles_deg(one.quaternion), "k", linewidth=1)
+        if belief is not None:
+            _plot_belief(axes[1], belief, index)
         goal = flight.goal_deg
         axes[1].axhline(goal, color="0.5", linestyle=":", label=f"{goal:g}°")
         axes[1].legend(loc="upper right", fontsize=8)
@@ -116,9 +54,16 @@ def slews(flight: Flight, folder: Path) -> list[Path]:
         for axis, label in zip(axes, labels):
             axis.set_ylabel(label)
         axes[3].set_xlabel("time (s)")
-        axes[0].set_title(f"Table 5, test {index + 1}, at {flight.hz}")
+        axes[0].set_title(f"Table 5, test {index + 1}, at {flight.conditions}", parse_math=False)
         paths.append(canvas.save(figure, folder, name))
     return paths
+
+
+def _plot_belief(axis, belief, index):
+    axis.lines[0].set_label("true")
+    believed, error = belief.angle_deg[:, index], belief.error_deg[:, index]
+    axis.semilogy(belief.time, believed, "--", color="tab:orange", linewidth=1, label="believed")
+    axis.semilogy(belief.time, error, color="tab:blue", linewidth=0.8, label="estimation error")
 
 
 def _plot_components(axis, time, values, names):
@@ -143,37 +88,57 @@ def _plot_pulses(axis, time, torque, spacecraft):
 def final_seconds(flight: Flight, folder: Path) -> Path:
     """The end of Table 5's slews, magnified: how a controller holds its target."""
     time, history = flight.table_5
+    belief = flight.belief(paper.table_5_slews(), history)
     shown = time > time[-1] - FINAL_SECONDS
-    angles = _angles_deg(history.quaternion)[shown]
+    angles = angles_deg(history.quaternion)[shown]
     figure, axis = canvas.subplots(figsize=(7, 4))
     for index, (marker, values) in enumerate(zip("o^s", angles.T)):
         axis.plot(
             time[shown], values, marker + "-", linewidth=1, markersize=3, label=f"test {index + 1}"
         )
-    axis.set_ylim(0, 1.2 * angles.max())
+    most = angles.max()
+    if belief is not None:
+        most = max(most, _plot_final_estimates(axis, belief, shown))
+    axis.set_ylim(0, 1.2 * most)
     axis.set_xlabel("time (s)")
     axis.set_ylabel("error angle φ (°)")
-    axis.set_title(f"Table 5, the last {FINAL_SECONDS:g} s, at {flight.hz}")
+    title = f"Table 5, the last {FINAL_SECONDS:g} s, at {flight.conditions}"
+    axis.set_title(title, parse_math=False)
     axis.legend(loc="upper right", ncols=4, fontsize=8)
     return canvas.save(figure, folder, "final_seconds")
+
+
+def _plot_final_estimates(axis, belief, shown):
+    """Their estimation errors, in the colours of the slews; returns the largest."""
+    errors = belief.error_deg[shown]
+    for line, values in zip(axis.lines[:], errors.T):
+        axis.plot(belief.time[shown], values, ":", color=line.get_color(), linewidth=1.2)
+    axis.plot([], [], ":", color="0.3", linewidth=1.2, label="estimation error")
+    return errors.max()
 
 
 @canvas.own_style()
 def error_histories(flight: Flight, folder: Path) -> Path:
     """The error angle of random slews over time, with quantiles."""
-    time, history = flight.record(jax.tree.map(lambda x: x[:RANDOM_SLEWS], flight.starts))
-    angles = _angles_deg(history.quaternion)
+    start = jax.tree.map(lambda x: x[:RANDOM_SLEWS], flight.starts)
+    time, history = flight.record(start)
+    angles = angles_deg(history.quaternion)
     figure, axis = canvas.subplots(figsize=(7, 4.5))
     axis.semilogy(time, angles, color="0.8", linewidth=0.3)
     for quantile, style in ((0.95, "--"), (0.5, "-"), (0.05, ":")):
         axis.semilogy(
             time, np.quantile(angles, quantile, axis=1), "k" + style, label=f"{quantile:.0%}"
         )
+    belief = flight.belief(start, history)
+    if belief is not None:
+        median = np.median(belief.error_deg, axis=1)
+        axis.semilogy(belief.time, median, color="tab:blue", label="estimation error, 50%")
     goal = flight.goal_deg
     axis.axhline(goal, color="tab:red", linestyle="-.", linewidth=1, label=f"{goal:g}°")
     axis.set_xlabel("time (s)")
     axis.set_ylabel("error angle φ (°)")
-    axis.set_title(f"{angles.shape[1]} random slews at {flight.hz}, and quantiles")
+    title = f"{angles.shape[1]} random slews at {flight.conditions}, and quantiles"
+    axis.set_title(title, parse_math=False)
     axis.legend()
     return canvas.save(figure, folder, "error_histories")
 
@@ -195,6 +160,8 @@ def distributions(flight: Flight, folder: Path) -> Path:
         axis.grid(alpha=0.3)
     axes[0].set_ylabel("share of the slews")
     axes[0].legend()
+    if not flight.env.world.is_ideal:
+        figure.suptitle(f"At {flight.conditions}", parse_math=False)
     return canvas.save(figure, folder, "distributions")
 
 
@@ -205,7 +172,7 @@ def settling(flight: Flight, folder: Path) -> Path:
     start = flight.starts.quaternion
     reference = jax.vmap(time_optimal.time_optimal_reference, (0, None))
     optimal = np.asarray(reference(start, env.context(params)))
-    angles = _angles_deg(start)
+    angles = angles_deg(start)
     settled = evaluation.successes(flown, params)
     times = evaluation.settling_times(flown, env)
     figure, axis = canvas.subplots(figsize=(7, 4.5))
@@ -222,6 +189,6 @@ def settling(flight: Flight, folder: Path) -> Path:
         axis.plot(middle, means, style, label=label)
     axis.set_xlabel("slew angle (°)")
     axis.set_ylabel(f"settling time to {flight.goal_deg:g}° (s)")
-    axis.set_title(f"Settling at {flight.hz}")
+    axis.set_title(f"Settling at {flight.conditions}", parse_math=False)
     axis.legend()
     return canvas.save(figure, folder, "settling")

@@ -26,10 +26,12 @@ FLAGS = (
 
 
 def embedded(page):
-    """The data of a page, with its flights as (slews, controllers, steps + 1, 10)."""
+    """The data of a page: flights as (slews, controllers, steps + 1, 10), beliefs as (..., 4)."""
     data = json.loads(re.search(r'id="flights">(.*?)</script>', page)[1])
-    flights = [[np.frombuffer(base64.b64decode(x), "<f4") for x in s] for s in data["flights"]]
-    data["flights"] = np.array(flights).reshape(len(flights), -1, data["steps"] + 1, 10)
+    for name, size in (("flights", 10), ("beliefs", 4)):
+        if name in data:
+            flights = [[np.frombuffer(base64.b64decode(x), "<f4") for x in s] for s in data[name]]
+            data[name] = np.array(flights).reshape(len(flights), -1, data["steps"] + 1, size)
     return data
 
 

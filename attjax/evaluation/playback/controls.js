@@ -106,6 +106,7 @@ function conditions() {
   const shape = Array.isArray(data.inertia[0]) ? "" : "diag";
   return [
     `${hertz} Hz (frameskip ${data.frameskip})`, `seed ${data.seed}`,
+    ...("world" in data ? [`world ${data.world}`] : []),
     `${data.spacecraft}, inertia ${shape}(${tensor.join(", ")}) kg m²`,
     ...(data.checkpoint === null ? [] : [`checkpoint ${data.checkpoint}`]),
     `attjax ${data.version}`,

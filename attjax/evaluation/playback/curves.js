@@ -7,22 +7,31 @@ const FONT = "11px system-ui, sans-serif";
 // Ranges that all flights of the page share, so that slews and controllers can be compared.
 function sharedScales(data, flights) {
   let [least, most, fastest] = [Infinity, data.goalAngle, data.rateLimit];
-  const torques = new Set();
+  let [weakest, strongest] = [Infinity, 0];
   for (const flight of flights) {
-    for (const angle of flight.angle) {
-      if (angle > 0) least = Math.min(least, angle);
-      most = Math.max(most, angle);
+    for (const angles of anglesOf(flight)) {
+      for (const angle of angles) {
+        if (angle > 0) least = Math.min(least, angle);
+        most = Math.max(most, angle);
+      }
     }
     for (const rate of flight.rate) fastest = Math.max(fastest, rate);
     for (let k = 0; k < data.steps; k++) {
-      for (const x of flight.torque(k)) if (x !== 0) torques.add(Math.abs(x));
+      for (const x of flight.torque(k)) {
+        if (x !== 0) weakest = Math.min(weakest, Math.abs(x));
+        strongest = Math.max(strongest, Math.abs(x));
+      }
     }
   }
   const low = 10 ** Math.floor(Math.log10(Math.min(least, data.goalAngle) * DEGREES));
-  const strongest = Math.max(...torques, 0) || 1;
-  const weakest = Math.min(...torques, strongest);
+  if (strongest === 0) weakest = strongest = 1;
+  // Of misaligned torques there are shares about other axes, too weak to be told apart with these.
+  weakest = clamp(data.leastTorque || 0, weakest, strongest);
   return { angle: [low, 1.5 * most * DEGREES], rate: 1.12 * fastest, torque: [weakest, strongest] };
 }
+
+const anglesOf = (flight) =>
+  [flight.angle, ...(flight.believed ? [flight.believedAngle, flight.estimationError] : [])];
 
 function layOut(width, height) {
   const [right, axis] = [width - RIGHT, height - 26];
@@ -70,7 +79,8 @@ function paintAngle({ context, layout: { angle: plot }, x, first, last, ...chart
     plot.bottom - ((Math.log10(Math.max(degrees, 10 ** low)) - low) / (high - low)) *
     (plot.bottom - plot.top);
   const goal = data.goalAngle * DEGREES;
-  title(context, plot, `error angle φ (°), goal ${short(goal)}`, colours);
+  const titled = `error angle φ (°), goal ${short(goal)}`;
+  title(context, plot, titled, colours);
   const every = Math.ceil((high - low) / ((plot.bottom - plot.top) / 14));
   for (let k = low; k <= high; k += every) {
     rule(context, [plot.left, y(10 ** k)], [plot.right, y(10 ** k)], colours.line, 0.5);
@@ -79,9 +89,22 @@ function paintAngle({ context, layout: { angle: plot }, x, first, last, ...chart
   }
   rule(context, [plot.left, y(goal)], [plot.right, y(goal)], colours.ink, 1, [4, 3]);
   write(context, "goal", plot.right + 6, y(goal), "left", colours.ink);
-  const points = range(first, last, (k) =>
-    [x(k * data.controlPeriod), y(flight.angle[k] * DEGREES)]);
-  curve(context, plot, points, colours.ink, 1.4);
+  const points = (angles) => range(first, last, (k) =>
+    [x(k * data.controlPeriod), y(angles[k] * DEGREES)]);
+  curve(context, plot, points(flight.angle), colours.ink, 1.4);
+  if (!flight.believed) return;
+  curve(context, plot, points(flight.believedAngle), colours.believed, 1.4, [3, 4]);
+  curve(context, plot, points(flight.estimationError), colours.believed, 1);
+  const after = plot.left + context.measureText(titled).width + 10;
+  paintKey(context, [["believed", [3, 4]], ["estimate off", []]], after, plot.top - 9, colours);
+}
+
+function paintKey(context, entries, left, y, colours) {
+  for (const [text, dashes] of entries) {
+    rule(context, [left, y], [left + 13, y], colours.believed, 1.4, dashes);
+    write(context, text, left + 17, y, "left", colours.believed);
+    left += 26 + context.measureText(text).width;
+  }
 }
 
 function paintRates({ context, layout: { rate: plot }, x, first, last, ...chart }) {
@@ -113,7 +136,7 @@ function paintTorques({ context, layout: { torque: plot }, x, first, last, ...ch
   const lane = (plot.bottom - plot.top - 2 * gap) / 3;
   const decades = 1 + Math.log10(strongest / weakest);
   const height = (torque) =>
-    ((Math.sign(torque) * lane) / 2) * ((1 + Math.log10(Math.abs(torque) / weakest)) / decades);
+    ((Math.sign(torque) * lane) / 2) * Math.max((1 + Math.log10(Math.abs(torque) / weakest)) / decades, 0);
   const wide = clamp(x(data.controlPeriod) - x(0) - 1, 0.8, 3);
   AXES.forEach((axis, i) => {
     const middle = plot.top + i * (lane + gap) + lane / 2;
@@ -138,12 +161,13 @@ function range(first, last, point) {
   return Array.from({ length: last - first + 1 }, (_, i) => point(first + i));
 }
 
-function curve(context, plot, points, colour, width) {
+function curve(context, plot, points, colour, width, dashes = []) {
   context.save();
   clipTo(context, plot);
   trace(context, points, false);
   context.strokeStyle = colour;
   context.lineWidth = width;
+  context.setLineDash(dashes);
   context.lineJoin = "round";
   context.stroke();
   context.restore();

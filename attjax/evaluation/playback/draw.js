@@ -1,7 +1,9 @@
 // Paints the spacecraft, its axes and the goal's.
 
 // Planes between its parts order them exactly: what lies on the eye's side is painted last.
-function paintScene(canvas, craft, quaternion, camera, colours) {
+// Where the truth was not told, thin lines behind it all end in rings around the tips that the
+// body's axes were believed to have.
+function paintScene(canvas, craft, [quaternion, believed], camera, colours) {
   const { context, width, height } = prepared(canvas);
   const view = viewFrom(camera, width, height);
   const attitude = rotation(quaternion);
@@ -22,11 +24,19 @@ function paintScene(canvas, craft, quaternion, camera, colours) {
     { near: view.eye[axis] > 0, paint: () => paintGoalAxis(scene, view, axis, REACH, GOAL_AXIS) },
   ]);
   const paint = (list, near) => list.filter((x) => x.near === near).forEach((x) => x.paint());
+  const tips = believed ? transpose(rotation(believed)).map((axis) =>
+    view.project(axis.map((x) => BODY_AXIS * x))) : [];
+  tips.forEach((tip) => rule(context, view.project([0, 0, 0]), tip, colours.believed, 1));
   paint(goals, false);
   paint(axes, false);
   body.forEach((part) => part());
   paint(axes, true);
   paint(goals, true);
+  if (believed) {
+    tips.forEach((tip) => paintRing(scene, tip));
+    context.font = "11px system-ui, sans-serif";
+    write(context, "○ axes as believed", 12, height - 10, "left", colours.believed);
+  }
 }
 
 // The canvas, cleared and sized to its place on the page, to be drawn on in CSS pixels.
@@ -98,6 +108,14 @@ function paintHead(context, [x0, y0], [x1, y1]) {
   const [across, down] = [(-4 * (y1 - y0)) / length, (4 * (x1 - x0)) / length];
   trace(context, [[x0 + across, y0 + down], [x1, y1], [x0 - across, y0 - down]], true);
   context.fill();
+}
+
+function paintRing({ context, colours }, [x, y]) {
+  context.beginPath();
+  context.arc(x, y, 7, 0, 2 * Math.PI);
+  context.strokeStyle = colours.believed;
+  context.lineWidth = 1;
+  context.stroke();
 }
 
 function paintGoalAxis(scene, view, axis, from, to) {

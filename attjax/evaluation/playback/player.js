@@ -12,16 +12,23 @@ function show(x) {
 
 const short = (x) => String(Number(x.toPrecision(3))).replace("-", "−");
 
+function floats(text) {
+  return new Float32Array(Uint8Array.from(atob(text), (x) => x.charCodeAt(0)).buffer);
+}
+
 // A row a sample, the start included: quaternion, angular velocity, torque of the step from there.
-function decode(text) {
-  const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-  const numbers = new Float32Array(bytes.buffer);
+// Where the truth was not told, also the quaternion that was believed at that moment.
+function decode(text, belief) {
+  const numbers = floats(text);
   const part = (from, to) => (k) => numbers.subarray(10 * k + from, 10 * k + to);
   const flight = { quaternion: part(0, 4), velocity: part(4, 7), torque: part(7, 10) };
-  flight.angle = samples((k) => {
-    const [x, y, z, w] = flight.quaternion(k);
-    return 2 * Math.atan2(Math.hypot(x, y, z), w);
-  });
+  flight.angle = samples((k) => errorAngle(flight.quaternion(k)));
+  if (belief) {
+    const believed = floats(belief);
+    flight.believed = (k) => believed.subarray(4 * k, 4 * k + 4);
+    flight.believedAngle = samples((k) => errorAngle(flight.believed(k)));
+    flight.estimationError = samples((k) => between(flight.believed(k), flight.quaternion(k)));
+  }
   flight.rate = samples((k) => Math.hypot(...flight.velocity(k)));
   let used = 0;
   flight.impulse = samples((k) => {
@@ -36,7 +43,9 @@ function decode(text) {
 }
 
 const samples = (value) => range(0, data.steps, value);
-const flights = data.flights.map((slew) => slew.map(decode));
+const hasBeliefs = "beliefs" in data;
+const flights = data.flights.map((slew, i) =>
+  slew.map((text, j) => decode(text, hasBeliefs && data.beliefs[i][j])));
 const scales = sharedScales(data, flights.flat());
 const craft = buildSpacecraft(data.inertia);
 const camera = { azimuth: 0.55, elevation: 0.32, zoom: 1 };
@@ -48,6 +57,7 @@ const panels = data.controllers.map((name, index) => {
   const section = element("panel").content.cloneNode(true).firstElementChild;
   section.querySelector("h2").textContent = name;
   section.setAttribute("aria-label", name);
+  section.classList.toggle("with-belief", hasBeliefs);
   element("panels").append(section);
   const part = (selector) => section.querySelector(selector);
   return {
@@ -59,7 +69,7 @@ const panels = data.controllers.map((name, index) => {
 function readColours() {
   const style = getComputedStyle(document.documentElement);
   const names = ["panel", "ink", "muted", "line", "x", "y", "z", "bus", "cell", "back", "dish",
-    "nozzle"];
+    "nozzle", "believed"];
   return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
@@ -71,10 +81,10 @@ function shownSpan() {
   return [from, from + length];
 }
 
-// Between two samples the attitude is interpolated; numbers are those of the last sample.
-function attitude(flight) {
+// Between two samples attitudes are interpolated; numbers are those of the last sample.
+function attitude(quaternion) {
   const step = currentStep();
-  const [a, b] = [step, Math.min(step + 1, data.steps)].map(flight.quaternion);
+  const [a, b] = [step, Math.min(step + 1, data.steps)].map(quaternion);
   const share = clamp(player.time / data.controlPeriod - step, 0, 1);
   return [0, 1, 2, 3].map((i) => a[i] + share * (b[i] - a[i]));
 }
@@ -85,6 +95,8 @@ function settledText(flight) {
   return flight.settled <= currentStep() ? (flight.settled * data.controlPeriod).toFixed(2) : "–";
 }
 
+const estimate = (flight, step) => show(flight.estimationError[step] * DEGREES);
+
 function update() {
   const step = currentStep();
   for (const panel of panels) {
@@ -93,7 +105,9 @@ function update() {
     panel.number("rate").textContent = show(flight.rate[step]);
     panel.number("settled").textContent = settledText(flight);
     panel.number("impulse").textContent = flight.impulse[step].toPrecision(3);
-    paintScene(panel.scene, craft, attitude(flight), camera, colours);
+    if (hasBeliefs) panel.number("estimate").textContent = estimate(flight, step);
+    const believed = hasBeliefs ? attitude(flight.believed) : null;
+    paintScene(panel.scene, craft, [attitude(flight.quaternion), believed], camera, colours);
     placeCursor(panel);
     if (player.span < duration) paintChart(panel);
   }
@@ -123,10 +137,12 @@ function updateAll() {
     paintChart(panel);
     const flight = flights[player.slew][panel.index];
     const end = show(flight.angle[data.steps] * DEGREES);
+    const off = hasBeliefs ? `, of the estimate ${estimate(flight, data.steps)}°` : "";
     panel.scene.setAttribute("aria-label", `${panel.name}: attitude of the spacecraft in 3-D. ` +
-      "Arrow keys turn the view, plus and minus zoom.");
+      `${hasBeliefs ? "Rings show its axes as believed. " : ""}Arrow keys turn the view, ` +
+      "plus and minus zoom.");
     panel.chart.setAttribute("aria-label", `${panel.name}, ${slew}: error angle, angular rates ` +
-      `and torque pulses over ${duration.toFixed(2)} s; error at the end ${end}°.`);
+      `and torque pulses over ${duration.toFixed(2)} s; error at the end ${end}°${off}.`);
   }
   update();
 }

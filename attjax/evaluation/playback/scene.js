@@ -22,6 +22,15 @@ function rotation([x, y, z, w]) {
   ];
 }
 
+// The angle of the turn by a quaternion, and of that between two of either sign, rad.
+const errorAngle = ([x, y, z, w]) => 2 * Math.atan2(Math.hypot(x, y, z), w);
+
+function between([a, b, c, d], [x, y, z, w]) {
+  const turn = [d * x - w * a - (b * z - c * y), d * y - w * b - (c * x - a * z),
+    d * z - w * c - (a * y - b * x)];
+  return errorAngle([...turn, Math.abs(a * x + b * y + c * z + d * w)]);
+}
+
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const apply = (matrix, v) => matrix.map((row) => dot(row, v));
 const transpose = (m) => m[0].map((_, i) => m.map((row) => row[i]));
