@@ -1,4 +1,4 @@
-"""Deliberate faults of the flight loop, for faults.py: what its filter and its predictor leave out."""
+"""Deliberate faults of the flight loop, for faults.py: what filter and predictor leave out."""
 
 FILTER = ["tests/control/test_estimator.py"]
 LOOP = ["tests/control/test_flight_loop.py"]

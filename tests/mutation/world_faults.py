@@ -37,16 +37,16 @@ WORLD_FAULTS = {
         "attjax/envs/worlds.py", "radius = EARTH_RADIUS + 1e3", "radius = 1e3", DISTURBANCES,
     ),
     "a pulse one RK4 step late": (
-        "attjax/dynamics/forced_motion.py", "_chosen(pulse.start == number,",
-        "_chosen(pulse.start + 1 == number,", WORLDS,
+        "attjax/dynamics/forced_motion.py", "vectors.chosen(pulse.start == number,",
+        "vectors.chosen(pulse.start + 1 == number,", WORLDS,
     ),
     "a held torque that ends with its period": (
         "attjax/dynamics/actuators.py", "count = most_delay // rk4_steps + (2 if held else 1)",
         "count = most_delay // rk4_steps + 1", WORLDS,
     ),
     "a star tracker that looks along another axis": (
-        "attjax/dynamics/sensors.py", "(self.about - self.across) * along * axis",
-        "(self.about - self.across) * along * axis[::-1]", SENSORS,
+        "attjax/dynamics/sensors.py", "vectors.dot((x, y, z), each)",
+        "vectors.dot((z, y, x), each)", SENSORS,
     ),
     "noise of the gyro for any sampling time": (
         "attjax/envs/sensors.py", "walk / jnp.sqrt(interval)", "walk", SENSORS,
@@ -56,11 +56,12 @@ WORLD_FAULTS = {
         "newest", SENSORS,
     ),
     "a bias that only grows": (
-        "attjax/dynamics/sensors.py", "kept * self.wandered + fresh", "self.wandered + fresh",
-        SENSORS,
+        "attjax/dynamics/sensors.py", "vectors.combined(kept, self.wandered, size, fresh)",
+        "vectors.combined(1, self.wandered, size, fresh)", SENSORS,
     ),
     "a sample of the agent step's end": (
-        "attjax/dynamics/forced_motion.py", "_chosen(number + 1 == sample, now, before)", "now",
+        "attjax/dynamics/forced_motion.py",
+        "vectors.chosen(number + 1 == sample, now, before)", "now",
         SENSORS,
     ),
     "the inertia that is believed flies": (
