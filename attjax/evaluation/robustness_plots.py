@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from attjax import canvas
+from attjax.evaluation.robustness_table import angle
 
 MARKERS = "o^sDv"
 LEAST_DEG = 1e-6
@@ -24,13 +25,15 @@ def heat_map(rows: Sequence[dict], folder: Path) -> Path:
     conditions = list(dict.fromkeys(row["condition"] for row in rows))
     flown = list(dict.fromkeys((row["controller"], row["flight_loop"]) for row in rows))
     angles = np.full((len(conditions), len(flown)), np.nan)
-    figure, axis = canvas.subplots(figsize=(2.5 + 1.3 * len(flown), 1 + 0.3 * len(conditions)))
+    figure, axis = canvas.subplots(figsize=(3 + 1.5 * len(flown), 1 + 0.32 * len(conditions)))
     for row in rows:
         y = conditions.index(row["condition"])
         x = flown.index((row["controller"], row["flight_loop"]))
         if row["rms_deg"] is not None:
             angles[y, x] = max(row["rms_deg"], LEAST_DEG)
-        axis.text(x, y, _words(row), ha="center", va="center", fontsize=7)
+        is_dark = not -3.5 < np.log10(angles[y, x]) < 0.5
+        ink = "white" if is_dark else "black"
+        axis.text(x, y, _words(row), ha="center", va="center", fontsize=7, color=ink)
     image = axis.imshow(np.log10(angles), aspect="auto", cmap="RdYlGn_r", vmin=-4.5, vmax=1.5)
     figure.colorbar(image, label="log10 of the rms error over the last fifth (°)")
     names = [f"{name}\n{'flight loop' if has_loop else 'bare'}" for name, has_loop in flown]
@@ -45,7 +48,7 @@ def _words(row):
     words = f"{100 * row['success_rate']:.4g} %"
     if row["overspeed_rate"]:
         words += f" ({100 * row['overspeed_rate']:.3g} % over)"
-    return words if row["rms_deg"] is None else f"{words}\n{row['rms_deg']:.2g}°"
+    return words if row["rms_deg"] is None else f"{words}\n{angle(row['rms_deg'])}°"
 
 
 @canvas.own_style()

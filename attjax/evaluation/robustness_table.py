@@ -41,18 +41,19 @@ def named(rows: Sequence[dict]) -> list[tuple[str, dict]]:
         >>> [name for name, row in named([looped, bare | {"rms_deg": 0.2}])]
         ['feedback, loop', 'feedback, bare']
     """
-
-    def apart(row):
-        return {name: x for name, x in row.items() if name != "flight_loop"}
-
     found = []
     for row in rows:
-        has_twin = sum(apart(row) == apart(other) for other in rows) > 1
+        has_twin = sum(without_loop(row) == without_loop(other) for other in rows) > 1
         if not has_twin:
             found.append((f"{row['controller']}, {'loop' if row['flight_loop'] else 'bare'}", row))
         elif row["flight_loop"]:
             found.append((row["controller"], row))
     return found
+
+
+def without_loop(row: dict) -> dict:
+    """The row, but for whether it is in a flight loop."""
+    return {name: x for name, x in row.items() if name != "flight_loop"}
 
 
 def _line(words):
