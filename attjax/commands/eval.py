@@ -26,7 +26,7 @@ examples:
   python eval.py --checkpoint ckpt/ --json - | python -m json.tool
   python eval.py --checkpoint ckpt/ --playback slews.html
   python eval.py --controller phase-plane           needs no checkpoint
-  python eval.py --checkpoint ckpt/ --robustness    in worlds that are not perfect
+  python eval.py --checkpoint ckpt/ --robustness    in imperfect worlds
 """
 
 
