@@ -1,6 +1,7 @@
-"""Errors of an estimate to first order: how they grow in a control period, and what shows them.
+"""Errors of an estimate to first order: how they grow in a control period.
 
-By components, for :mod:`attjax.control.estimator`.
+By components, for :mod:`attjax.control.estimator`: three each of θ, Δω and, where there are any, of
+bias and torque.
 """
 
 from typing import Any, NamedTuple
@@ -19,8 +20,6 @@ from attjax.envs.context import Context
 from attjax.envs.knowledge import AttitudeNoise, Knowledge, RateNoise
 
 AXES = range(3)
-ATTITUDE, RATE = 0, 3
-"""Where the errors θ and Δω begin; those of bias and torque follow where there are any."""
 
 
 class Model(NamedTuple):

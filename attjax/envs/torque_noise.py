@@ -12,6 +12,9 @@ from attjax.spacecraft import INTEGRATION_STEP
 from attjax.world import World
 from attjax.world.distributions import moments, root_mean_square
 
+LEAST_TORQUE = 1e-15
+"""N m: gravity does not turn a sphere, and nothing is to be divided by that."""
+
 
 class TorqueNoise(struct.PyTreeNode):
     """Of the disturbances together.
@@ -53,7 +56,7 @@ def torque_noise(world: World, inertia: chex.Array, period: chex.Numeric) -> Tor
         period: time between two decisions, s.
     """
     given = world.disturbances
-    if given is None or given == type(given)():
+    if given is None:
         return None
     fixed = moments(given.constant_torque)[1] / 3
     turning, orbital_rate = 0.0, 0.0
@@ -74,6 +77,8 @@ def torque_noise(world: World, inertia: chex.Array, period: chex.Numeric) -> Tor
         swinging = moments(given.sinusoid.torque)[1] / 6
         swing = 2 * math.pi / moments(given.sinusoid.period)[0]
     total = fixed + turning + swinging
+    if isinstance(total, float) and total == 0:
+        return None
     return TorqueNoise(
         variance=total,
         turning=turning,
@@ -90,7 +95,7 @@ def _hidden(sensors, inertia, torque, period):
     interval = clock_of(tracker).period * INTEGRATION_STEP or period
     density = ARCSEC * root_mean_square(tracker.cross_boresight_arcsec) * jnp.sqrt(interval)
     moment = jnp.mean(inertia if inertia.ndim == 1 else jnp.diag(inertia))
-    return moment * density / torque
+    return moment * density / jnp.maximum(torque, LEAST_TORQUE)
 
 
 def _mean_square(part, *more):

@@ -118,6 +118,23 @@ def flight_measurement(true, seen):
     return Measurement(jnp.stack(then), True, jnp.stack(rate), True)
 
 
+@pytest.mark.parametrize(
+    "disturbances",
+    [
+        {"flexible": {"frequency": 1, "participation": 0.1}},
+        {"gravity_gradient": True},
+        {"gravity_gradient": True, "constant_torque": 1e-4},
+    ],
+)
+def test_where_nothing_turns_a_body_at_rest_all_is_finite(disturbances):
+    """A flexible mode alone, and the pull of gravity at a sphere: there is nothing to divide by."""
+    sphere = Spacecraft(inertia=(0.5, 0.5, 0.5), duration=2.0)
+    described = world(sensors={"star_tracker": {"rate_hz": 4}}, disturbances=disturbances)
+    env = AttitudeEnv(5, spacecraft=sphere, world=described)
+    errors, _ = flown(env, lambda told, context: jnp.asarray(0), 3, 40)
+    assert np.all(np.isfinite(errors))
+
+
 def exact(name):
     """A named world whose torques, inertia and gyro are as believed; the rest as it is."""
     named = World.named(name)
