@@ -40,6 +40,7 @@ def believing(craft, **tables):
     known = memory.estimate.replace(
         quaternion=tuple(quaternions.normalize(jnp.array([0.2, -0.3, 0.4, 0.8]))),
         angular_velocity=tuple(jnp.array([0.3, -0.2, 0.25])),
+        bias=tuple(jnp.array([1e-3, -2e-3, 5e-4])),
         torque=tuple(jnp.array([1e-3, -2e-3, 5e-4])),
     )
     if known.wheel_speeds is not None:

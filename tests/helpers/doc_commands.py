@@ -1,7 +1,7 @@
 """The commands of the documentation: which kinds there are, and how each is checked and run.
 
-A command in a code block is checked and, where that takes no network, peer or minutes, run:
-shortened, on CPU, in a folder like a clone. A command within the text is only checked.
+In a code block, where that takes no network, peer or minutes, it is checked and run: shortened, on
+CPU, in a folder like a clone. A command within the text is only checked.
 """
 
 import contextlib
@@ -138,11 +138,9 @@ def _check_make(arguments):
     """The target exists, and what it runs has the flags that ARGS passes on."""
     if shutil.which("make") is None:
         return
-    environment = {k: v for k, v in os.environ.items() if not k.startswith(("MAKE", "MFLAGS"))}
-    result = subprocess.run(
-        ["make", "--dry-run", *arguments],
-        capture_output=True, text=True, timeout=60, env=environment, cwd=ROOT,
-    )  # fmt: skip
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(("MAKE", "MFLAGS"))}
+    options = {"capture_output": True, "text": True, "timeout": 60, "env": clean, "cwd": ROOT}
+    result = subprocess.run(["make", "--dry-run", *arguments], **options)
     assert result.returncode == 0, result.stderr
     for line in result.stdout.splitlines():
         if re.search(r"python (train|eval)\.py|pip install", line):
@@ -199,7 +197,8 @@ def _train(arguments):
 
 
 def _evaluate(arguments):
-    _succeeds(eval_script.main, [*arguments, "--device", "cpu", "--episodes", "20"])
+    if "--robustness" not in arguments:  # which takes minutes: test_robustness.py runs it shortened
+        _succeeds(eval_script.main, [*arguments, "--device", "cpu", "--episodes", "20"])
 
 
 def _export(arguments):
