@@ -89,7 +89,7 @@ def test_momentum_is_conserved_in_the_targets_frame(x64, has_wheels):
     after = flown(env, state, [1, 4, 7, 10, 5] * 8 if has_wheels else [0] * 40)
     assert np.abs(after.plant.deflection - plant.deflection).max() > 0.01
     before, later = (oracle.momentum(Motion.of(x)) for x in (state, after))
-    np.testing.assert_allclose(later, before, rtol=0, atol=1e-12)  # 2e-13
+    np.testing.assert_allclose(later, before, rtol=0, atol=1e-12)
 
 
 def test_what_is_drawn_is_as_described():

@@ -71,7 +71,7 @@ def test_wheels_and_disturbances_are_as_by_dop853(x64, inertia, held, delay):
         return np.where(np.arange(4) == rest // 2, amount, 0)
 
     expected = MovingOracle(state.plant).fly(Motion.of(state), motors, 6 * len(actions))
-    for found, value in zip(Motion.of(after), expected):  # 2e-13
+    for found, value in zip(Motion.of(after), expected):
         np.testing.assert_allclose(found, value, rtol=0, atol=1e-11)
 
 
@@ -91,7 +91,7 @@ def test_momentum_is_conserved_in_the_targets_frame(x64):
         after = flown(env, beginning, actions)
         assert np.abs(after.angular_velocity - state.angular_velocity).max() > 0.1
         momentum = oracle.momentum(Motion.of(after))
-        np.testing.assert_allclose(momentum, before, rtol=0, atol=1e-12)  # 2e-13
+        np.testing.assert_allclose(momentum, before, rtol=0, atol=1e-12)
 
 
 BALL = Spacecraft(inertia=(2, 2, 2), torque_levels=(0.01, 0.001), torque_held=True)
