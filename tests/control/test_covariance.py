@@ -81,3 +81,14 @@ def test_single_precision_survives_what_is_told_exactly():
     )
     assert np.all(np.linalg.eigvalsh(full(after)) > -1e-14)
     np.testing.assert_allclose(correction, [1e-4, -1e-4], rtol=1e-2)
+
+
+def test_rounding_is_not_taken_for_what_is_known():
+    """The sum of rate and bias is known exactly, and an angle with it but for its last digit."""
+    one, angle = np.float32(1e-6), np.float32(2.5e-8)
+    spread = ((np.float32(1e-8), angle, -np.nextafter(angle, one)), (one, -one), (one,))
+    measured = [Scalar([None, ONE, ONE], np.float32(1e-9), np.float32(1e-20), np.float32(1))]
+    start, rounding = [np.float32(0)] * 3, float(np.finfo(np.float32).eps)
+    after, correction = covariance.updated(spread, start, measured, rounding)
+    assert abs(correction[0]) < 1e-9
+    assert np.all(np.diag(full(after)) > 0)
