@@ -11,7 +11,7 @@ from attjax.dynamics.actuators import Queue
 from attjax.dynamics.bodies import body_of
 from attjax.dynamics.disturbances import Acting
 from attjax.dynamics.equations import Kinematics
-from attjax.dynamics.forced_motion import ForcedEquations, ForcedState, Held
+from attjax.dynamics.forced_motion import ForcedEquations, ForcedState, Held, unseen
 from attjax.dynamics.vectors import Quaternion, Vector
 from attjax.envs.context import Context
 from attjax.envs.torques import applied_torque, commanded
@@ -78,7 +78,7 @@ def _moved(estimate, queue, context, step):
         estimate.quaternion,
         estimate.angular_velocity,
         None,
-        tuple(None if x is None else (jnp.zeros_like(x),) * n for x, n in zip(samples, (4, 3))),
+        unseen(samples),
         None if estimate.wheel_speeds is None else (estimate.wheel_speeds, None),
     )
     known = context.knowledge.wheels

@@ -65,7 +65,7 @@ class Noise(NamedTuple):
 def model(queue: Queue, context: Context) -> Model:
     """The model of a control period, from the torques commanded until its beginning."""
     inertia = context.inertia
-    rows = tuple(inertia) if inertia.ndim == 1 else tuple(map(tuple, inertia))
+    rows = vectors.components(inertia)
     impulse = belief.impulse(queue, context)
     turning = 2 * context.kinematic_factor
     period, wheels = context.control_period, context.knowledge.wheels

@@ -102,13 +102,9 @@ def body_of(
         turning = jnp.diag(inertia) if inertia.ndim == 1 else inertia
         for vector in (jnp.stack(x) for part in parts for x in part.coupling):
             turning = turning - vector[:, None] * vector
-        rows = _components(rigid_body.inverse(turning))
-        return BodyWithParts(_components(inertia), rows, wheels, flexible)
+        rows = vectors.components(rigid_body.inverse(turning))
+        return BodyWithParts(vectors.components(inertia), rows, wheels, flexible)
     if inertia.ndim == 1:
-        return RigidBody(PrincipalTerms.of(inertia), _components(1 / inertia))
+        return RigidBody(PrincipalTerms.of(inertia), vectors.components(1 / inertia))
     inverse = rigid_body.inverse(inertia)
-    return RigidBody(TensorTerms.of(inertia, inverse), _components(inverse))
-
-
-def _components(array: chex.Array) -> Any:
-    return tuple(array) if array.ndim == 1 else tuple(map(tuple, array))
+    return RigidBody(TensorTerms.of(inertia, inverse), vectors.components(inverse))

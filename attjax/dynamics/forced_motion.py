@@ -6,6 +6,7 @@ loop integrates them. What a world lacks is None here, and nothing of it is comp
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -35,6 +36,15 @@ class ForcedState(NamedTuple):
     phasor: tuple[Any, Any] | None
     seen: tuple[Any, ...] = (None, None)
     aboard: tuple[Any, ...] | None = None
+
+
+def unseen(samples: Sequence[Any]) -> tuple[Any, ...]:
+    """Zeros for what sensors sample in an agent step: a quaternion's change, and a rate's.
+
+    Args:
+        samples: as of :class:`ForcedEquations`.
+    """
+    return tuple(None if x is None else (jnp.zeros_like(x),) * n for x, n in zip(samples, (4, 3)))
 
 
 class Pulse(NamedTuple):

@@ -17,7 +17,7 @@ from attjax.dynamics.bodies import body_of
 from attjax.dynamics.disturbances import Disturbances, Orbit
 from attjax.dynamics.draws import Draws
 from attjax.dynamics.equations import Kinematics, add
-from attjax.dynamics.forced_motion import ForcedEquations, ForcedState, Held
+from attjax.dynamics.forced_motion import ForcedEquations, ForcedState, Held, unseen
 from attjax.dynamics.fused_loop import apart, together
 from attjax.dynamics.integration import AgentStep
 from attjax.dynamics.moving_parts import FlexibleMode, Wheels
@@ -81,7 +81,7 @@ class Plant(struct.PyTreeNode):
         samples = (None, None) if self.sensing is None else self.sensing.samples(times, dtype)
         phasor = self._phasor(time * period)
         body = tuple(quaternion), tuple(angular_velocity)
-        start = ForcedState(*body, phasor, _unseen(samples), self._aboard())
+        start = ForcedState(*body, phasor, unseen(samples), self._aboard())
         equations = self._equations(agent_step, (time + 0.5) * period)._replace(samples=samples)
         change: Any = integration.change(agent_step, start, equations, limit)
         end = _attained(start, *change[:2])
@@ -136,15 +136,6 @@ class Plant(struct.PyTreeNode):
         if self.actuators is not None:
             delay = self.actuators.delay_of(self._draws(time))
         return self.replace(queue=self.queue.and_then(delay, apart(torque)))
-
-
-def _unseen(samples):
-    """Zeros for what sensors sample in an agent step: a quaternion's change, and a rate's."""
-    attitude, rate = samples
-    return (
-        None if attitude is None else (jnp.zeros_like(attitude),) * 4,
-        None if rate is None else (jnp.zeros_like(rate),) * 3,
-    )
 
 
 def _attained(start, turn, acceleration):

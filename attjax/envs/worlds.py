@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from attjax.dynamics import numerics
+from attjax.dynamics import numerics, vectors
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics.actuators import Actuators, empty_queue
 from attjax.dynamics.disturbances import (
@@ -113,7 +113,7 @@ def _disturbances(world, draws, inertia, orbit):
     given = world.disturbances
     if given is None:
         return Disturbances()
-    moments_or_rows: Any = tuple(inertia) if inertia.ndim == 1 else tuple(map(tuple, inertia))
+    moments_or_rows = vectors.components(inertia)
     return Disturbances(
         gravity_gradient=moments_or_rows if given.gravity_gradient else None,
         dipole=_dipole(world, draws, orbit) if given.residual_dipole != 0 else None,

@@ -16,6 +16,7 @@ from attjax.envs.attitude import AttitudeEnv
 from attjax.evaluation.episodes import Episodes, fly_side_by_side
 from attjax.evaluation.flown import Controller
 from attjax.evaluation.ladder import conditions
+from attjax.spacecraft import LM50
 from attjax.world import World, made_for
 
 CONDITIONS_AT_ONCE = 2
@@ -84,7 +85,7 @@ def _rows(controllers, flights, name, world):
 def environment(env: AttitudeEnv, world: World) -> AttitudeEnv:
     """The simulator in a world: with the spacecraft that this was described for, if another."""
     spacecraft = made_for(world)
-    if spacecraft == made_for(World()):
+    if spacecraft == LM50:
         spacecraft = env.spacecraft
     return dataclasses.replace(env, world=world, spacecraft=spacecraft)
 

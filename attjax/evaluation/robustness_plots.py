@@ -31,7 +31,7 @@ def heat_map(rows: Sequence[dict], folder: Path) -> Path:
         x = flown.index((row["controller"], row["flight_loop"]))
         if row["rms_deg"] is not None:
             angles[y, x] = max(row["rms_deg"], LEAST_DEG)
-        is_dark = not -3.5 < np.log10(angles[y, x]) < 0.5
+        is_dark = abs(np.log10(angles[y, x]) + 1.5) > 2  # and not where there is no angle
         ink = "white" if is_dark else "black"
         axis.text(x, y, _words(row), ha="center", va="center", fontsize=7, color=ink)
     image = axis.imshow(np.log10(angles), aspect="auto", cmap="RdYlGn_r", vmin=-4.5, vmax=1.5)
