@@ -95,4 +95,5 @@ def test_a_bad_world_is_one_line(tmp_path, capsys, content, said):
 
 def test_a_missing_world_is_one_line(capsys):
     said = one_line_error(eval_script.main, ["--controller=feedback", "--world=heaven"], capsys)
-    assert "--world is heaven; it must be ideal, or a TOML file" in said
+    known = "ideal or cubesat-6u or innocube-3u or lm50-leo or stress"
+    assert f"--world is heaven; it must be {known}, or a TOML file" in said

@@ -85,7 +85,10 @@ def derivative(
     )
 
 
-def turned(quaternion: Sequence[Any], turn: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
+def turned(
+    quaternion: Real[Array, "4 *batch"] | Sequence[Any],
+    turn: Real[Array, "3 *batch"] | Sequence[Any],
+) -> tuple[Any, Any, Any, Any]:
     """The attitude after a further turn of the body, axis times angle in its frame, rad.
 
     Args:
