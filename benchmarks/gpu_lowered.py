@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from attjax import AttitudeEnv, sharding
 from attjax.config.presets import PRESETS
 from attjax.envs import batch
-from attjax.evaluation import episodes
+from attjax.evaluation import blocks, episodes
 from attjax.ppo import descent, train, train_state
 from attjax.ppo.rollout import rollout
 from attjax.runs import build
@@ -89,7 +89,7 @@ def evaluation(env: AttitudeEnv, policy, params, slews: int) -> jax.stages.Lower
 
     def fly(controller, keys):
         # Not by its own jit: of parameters that are constants, the number of steps is known.
-        return episodes.fly_blocks.__wrapped__(controller, env, env.default_params, keys)
+        return blocks.fly_blocks.__wrapped__(controller, env, env.default_params, keys)
 
     return jax.jit(fly).lower(controller, keys)
 

@@ -1,6 +1,7 @@
 """Judging controllers: episodes, statistics, the paper's tables, figures, playback."""
 
-from attjax.evaluation.episodes import Episodes, Holding, fly, random_slews
+from attjax.evaluation.blocks import Episodes, Holding
+from attjax.evaluation.episodes import fly, random_slews
 from attjax.evaluation.flown import Controller
 from attjax.evaluation.history import History, record
 from attjax.evaluation.summary import (

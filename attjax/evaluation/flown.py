@@ -1,7 +1,7 @@
 """What flies in an evaluation: a controller, told what sensors say, or a flight loop around one."""
 
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import chex
 import jax
@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from attjax.control.flight_loop import FlightLoop, Memory
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import vectors
+from attjax.envs import batch
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
 from attjax.envs.parameters import EnvParams, EnvState, measured
@@ -24,11 +25,35 @@ Crew: TypeAlias = tuple[Controller, ...]
 """Controllers that fly the same slews side by side, flight loops first."""
 
 
-def first_memory(controllers: Crew, context: Context, slews: int) -> Memory | None:
+class Flown(NamedTuple):
+    """What is flown.
+
+    Attributes:
+        env: the simulator.
+        params: its parameters; those in which the slews' spacecraft differ have a leading axis
+            (slews,).
+    """
+
+    env: AttitudeEnv
+    params: EnvParams
+
+    def each(self, function: Callable, rows: slice, *samples: Any) -> Any:
+        """What ``function(*sample, context)`` gives of the samples of some of the slews."""
+        axes = batch.param_axes(self.env, self.params)
+        params = batch.params_of(self.env, self.params, rows)
+
+        def of_one(params, *sample):
+            return function(*sample, self.env.context(params))
+
+        return jax.vmap(of_one, (axes, *(0,) * len(samples)))(params, *samples)
+
+
+def first_memory(controllers: Crew, of: Flown, slews: int) -> Memory | None:
     """Before the first decision, of so many slews a loop; None where nothing is remembered."""
     loops = _loops(controllers)
     if not loops:
         return None
+    context = of.env.context(batch.params_of(of.env, of.params, 0))
     memory, count = loops[0].init(context), slews * len(loops)
     return jax.tree.map(lambda x: jnp.broadcast_to(x, (count, *jnp.shape(x))), memory)
 
@@ -38,33 +63,28 @@ def _loops(controllers):
 
 
 def decide(
-    controllers: Crew, context: Context, memory: Memory | None, told: chex.Array, states: Any
+    controllers: Crew, of: Flown, memory: Memory | None, told: chex.Array, states: Any
 ) -> tuple[chex.Array, Memory | None]:
     """The actions of all slews, and what is remembered after them.
 
     Args:
         controllers: flight loops first; each flies as many of the slews as the others.
-        context: of all of them.
+        of: what is flown.
         memory: of the flight loops before it.
         told: (slews, 11) observations, as a controller without a loop is told.
         states: (slews,), of which a flight loop is told the measurements.
     """
-    each, loops = len(told) // len(controllers), _loops(controllers)
-    looped = each * len(loops)
+    count, loops = len(told) // len(controllers), _loops(controllers)
+    looped = slice(0, count * len(loops))
     if loops:
-        of_loops = jax.tree.map(lambda x: x[:looped], states)
-        observed, memory = jax.vmap(loops[0].observed, (0, 0, None))(
-            memory, jax.vmap(measured)(of_loops), context
-        )
-        told = jnp.concatenate([observed, told[looped:]])
+        measurements = jax.vmap(measured)(jax.tree.map(lambda x: x[looped], states))
+        observed, memory = of.each(loops[0].observed, looped, memory, measurements)
+        told = jnp.concatenate([observed, told[looped.stop :]])
     acting = [x.controller if isinstance(x, FlightLoop) else x for x in controllers]
-    actions = [
-        jax.vmap(act, (0, None))(told[n * each : (n + 1) * each], context)
-        for n, act in enumerate(acting)
-    ]
-    action = jnp.concatenate(actions)
+    rows = [slice(n * count, (n + 1) * count) for n in range(len(acting))]
+    action = jnp.concatenate([of.each(act, part, told[part]) for act, part in zip(acting, rows)])
     if loops:
-        memory = jax.vmap(loops[0].after, (0, 0, None))(memory, action[:looped], context)
+        memory = of.each(loops[0].after, looped, memory, action[looped])
     return action, memory
 
 
@@ -99,7 +119,7 @@ def step(
 
     Args:
         controllers: as of :func:`decide`.
-        env, params: that they fly.
+        env, params: that they fly, as of :class:`Flown`.
         moment: the slews' keys, from which each step's is folded in, and which step it is.
         before: memory, observations (slews, 11) and states.
 
@@ -107,6 +127,7 @@ def step(
         The memory, and what ``env.step_env`` returns of each slew.
     """
     (keys, index), (memory, observation, state) = moment, before
-    action, memory = decide(controllers, env.context(params), memory, observation, state)
+    action, memory = decide(controllers, Flown(env, params), memory, observation, state)
     keys = jax.vmap(jax.random.fold_in, (0, None))(keys, index)
-    return memory, jax.vmap(env.step_env, (0, 0, 0, None))(keys, state, action, params)
+    axes = batch.param_axes(env, params)
+    return memory, jax.vmap(env.step_env, (0, 0, 0, axes))(keys, state, action, params)

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
+from attjax.envs import batch
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.keys import observation_key, steps_key
 from attjax.envs.parameters import EnvParams, EnvState
@@ -46,12 +47,13 @@ def record(
     Of slews of :func:`random_slews`, and with the same key, they are the flights of :func:`fly`.
     States that were put together without a world get one of the environment's.
     """
-    reset_keys = jax.random.split(key, len(start.time))
+    reset_keys, axes = jax.random.split(key, len(start.time)), batch.param_axes(env, params)
     if start.plant is None:
-        start = jax.vmap(placed, (None, 0, 0, None))(env, reset_keys, start, params)
-    first = jax.vmap(lambda key, state: env.observe(observation_key(key), state, params))
-    observation, keys = first(reset_keys, start), jax.vmap(steps_key)(reset_keys)
-    memory = flown.first_memory((controller,), env.context(params), len(reset_keys))
+        start = jax.vmap(placed, (None, 0, 0, axes))(env, reset_keys, start, params)
+    observe = jax.vmap(env.observe, (0, 0, axes))
+    observation = observe(jax.vmap(observation_key)(reset_keys), start, params)
+    keys = jax.vmap(steps_key)(reset_keys)
+    memory = flown.first_memory((controller,), flown.Flown(env, params), len(reset_keys))
 
     def step(carry, index):
         _, _, state = carry

@@ -123,18 +123,18 @@ FAULTS = {
         "jax.random.fold_in(device_key, 0)", LEARNING,
     ),
     "closest angle is the last": (
-        "attjax/evaluation/episodes.py",
+        "attjax/evaluation/blocks.py",
         "closest_angle=jnp.where(closer, angle, so_far.closest_angle)",
         "closest_angle=angle", ["tests/evaluation/test_episodes.py"],
     ),
     "closest rate is the last": (
-        "attjax/evaluation/episodes.py",
+        "attjax/evaluation/blocks.py",
         "closest_rate=jnp.where(closer, rate, so_far.closest_rate)",
         "closest_rate=rate", ["tests/evaluation/test_episodes.py"],
     ),
     "impulse of a held torque is that of a pulse, in evaluation": (
-        "attjax/evaluation/episodes.py",
-        "context.torque_duration", "(1 / 240)", ["tests/evaluation/test_episodes.py"],
+        "attjax/evaluation/blocks.py",
+        "env.context(first).torque_duration", "(1 / 240)", ["tests/evaluation/test_episodes.py"],
     ),
     "impulse of a held torque is that of a pulse, for a reward": (
         "attjax/envs/attitude.py", "self.context(params).torque_duration,", "INTEGRATION_STEP,",
