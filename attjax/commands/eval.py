@@ -27,6 +27,7 @@ examples:
   python eval.py --checkpoint ckpt/ --playback slews.html
   python eval.py --controller phase-plane           needs no checkpoint
   python eval.py --checkpoint ckpt/ --robustness    in imperfect worlds
+  python eval.py --checkpoint pretrained/universal --fleet --frameskip 20
 """
 
 
@@ -81,6 +82,11 @@ def _add_conditions(group):
         "for a classical controller the named world's, else LM50)"
     )
     group.add_argument("--spacecraft", type=command_line.path, metavar="FILE", help=craft_help)
+    fleet_help = (
+        "fly each slew with another spacecraft, drawn as those that universal trains on, and "
+        "compare with what each of them can"
+    )
+    group.add_argument("--fleet", action="store_true", help=fleet_help)
     command_line.add_world(group, "that of the policy's training; ideal for a classical controller")
     duration_help = "length of an episode (default: the spacecraft's; LM50's is 43.75)"
     limits = {"above": 0, "high": MOST_DURATION}
@@ -144,12 +150,11 @@ def _evaluate(arguments, controllers, env, plots, metrics, json_file):
     from attjax.evaluation import tables
 
     params, seed, episodes = env.default_params, arguments.seed or 0, arguments.episodes
+    judge = evaluation.evaluate_fleet if arguments.fleet else evaluation.evaluate
     start, results, written = time.monotonic(), [], []
     for name, controller in controllers.items():
         with evaluation_output.flying(name, episodes) as told:
-            judged = evaluation.evaluate(
-                controller, env, episodes=episodes, seed=seed, progress=told
-            )
+            judged = judge(controller, env, episodes=episodes, seed=seed, progress=told)
         results.append({"controller": name} | judged)
         if plots:
             folder = arguments.plot / name if arguments.compare else arguments.plot
@@ -199,13 +204,18 @@ def _flown(name, arguments, env, config):
 def _controller(name, arguments, env, config):
     import jax
 
-    from attjax.control import classical
+    from attjax.control import classical, own_units
     from attjax.runs import checkpoint
 
     if name != POLICY:
         return jax.tree_util.Partial(classical.CONTROLLERS[name])
     folder, trained_on = arguments.checkpoint, config.spacecraft
-    if env.actions == "discrete" and trained_on.num_actions != env.num_actions:
+    is_universal = config.settings.network.features == "universal"
+    if is_universal:
+        with errors.one_line_errors(ValueError):
+            own_units.check_axes(env.spacecraft)
+    is_tied = env.actions == "discrete" and not is_universal
+    if is_tied and trained_on.num_actions != env.num_actions:
         raise errors.UserError(
             f"{arguments.spacecraft} has {env.num_actions} actions; the policy in {folder} "
             f"chooses among {trained_on.num_actions}"

@@ -9,13 +9,18 @@ from attjax import errors
 from attjax.config import run as run_config
 from attjax.config import toml
 from attjax.runs import folder as run_folder
-from attjax.spacecraft import INTEGRATION_STEP, Spacecraft
+from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
 from attjax.world import IDEAL, World, made_for
 
 if TYPE_CHECKING:
     from attjax.envs.attitude import AttitudeEnv
 
 POLICY = "policy"
+NOT_WITH = {
+    "robustness": ("world", "bare", "sampled", "playback", "fleet"),
+    "fleet": ("spacecraft", "world", "plot", "playback"),
+}
+"""Flags by the one that they do not go with."""
 
 
 def config(arguments: argparse.Namespace, names: Collection[str]) -> run_config.Config | None:
@@ -49,11 +54,10 @@ def complete(arguments: argparse.Namespace) -> None:
     """
     if arguments.episodes is None:
         arguments.episodes = 1000 if arguments.robustness else 5000
-    if not arguments.robustness:
-        return
-    for flag in ("world", "bare", "sampled", "playback"):
-        if getattr(arguments, flag):
-            raise errors.UserError(f"--{flag} does not go with --robustness")
+    for ladder, flags in NOT_WITH.items():
+        for flag in flags if getattr(arguments, ladder) else ():
+            if getattr(arguments, flag):
+                raise errors.UserError(f"--{flag} does not go with --{ladder}")
 
 
 def world(arguments: argparse.Namespace, config: run_config.Config | None) -> World:
@@ -77,7 +81,9 @@ def spacecraft(
     Raises:
         UserError: its file cannot be read or describes none, or the duration is too short.
     """
-    if arguments.spacecraft is not None:
+    if arguments.fleet:
+        craft = dataclasses.replace(LM50, name="any spacecraft")
+    elif arguments.spacecraft is not None:
         craft = toml.read_spacecraft(arguments.spacecraft)
     else:
         craft = config.spacecraft if config else made_for(world)

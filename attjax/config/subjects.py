@@ -48,6 +48,10 @@ class Task(Checked):
     stagger_episodes: bool = _task(
         "start the first episodes at random times, so that they do not end all at once"
     )
+    any_spacecraft: bool = _task(
+        "train on spacecraft of every kind, drawn anew every 32 updates, not on the run's own",
+        before=False,
+    )
     kinematic_factor: float = _task(
         "factor of Eq. 9, 0.5; 1 in the authors' public code, where attitude turns twice as fast",
         above=0,
@@ -70,9 +74,9 @@ class Network(Checked):
     """What the networks see, their size, and the mask of their actions."""
 
     features: str = _networks(
-        "network inputs: Eq. 11 as it is, tanh(k x) of attitude and rate at nine scales, or "
-        "module:function",
-        choices=("state", "multiscale"),
+        "network inputs: Eq. 11 as it is, tanh(k x) of attitude and rate at nine scales, the same "
+        "in the spacecraft's own units, or module:function",
+        choices=("state", "multiscale", "universal"),
         or_function=True,
     )
     hidden_sizes: tuple[int, ...] = _networks(

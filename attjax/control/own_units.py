@@ -4,18 +4,27 @@ Let aⱼ be the directions of three torque axes, J the largest impulse about one
 control period. With Iω = J Σ pⱼ aⱼ, the largest impulse adds 1 to one pⱼ, whatever the inertia and
 the axes. With I θ = J h Σ yⱼ aⱼ, where θ is the turn to the goal, near it y grows by p in a period.
 Torques that last for d move it by p d/2h less; z = y + p d/2h grows as if they came at once.
+
+Spacecraft that differ in the names of their axes alone are the same, too: the axes are put into an
+order, by the momentum that a turn about each takes, and so are the torques.
 """
 
+import dataclasses
 from typing import NamedTuple
 
 import chex
 import jax.numpy as jnp
+import numpy as np
 
 from attjax.envs.context import Context
+from attjax.spacecraft import Spacecraft
 
 AXES, LEVELS = 3, 3
 ACTIONS = 1 + 2 * LEVELS * AXES
-"""Of a spacecraft with so many torque axes and levels."""
+"""Torques that are chosen from: none, and each level about each axis in both directions."""
+
+FLATTEST = 1e-3
+"""Volume that unit vectors along the axes must span, at least."""
 
 
 class OwnUnits(NamedTuple):
@@ -24,8 +33,8 @@ class OwnUnits(NamedTuple):
     Attributes:
         momentum: (3, 3) p = momentum ω, 1/(rad/s).
         directions: (3, 3) unit vectors of the torque axes, a row each, body frame.
-        shape: (3, 3) symmetric, momentum of a turn about the torque axes: pⱼ = Σ shapeⱼₖ ωₖ where
-            the axes are at right angles.
+        shape: (3, 3) symmetric: p of a turn of 1 rad/s about each axis of the reciprocal basis,
+            which are the torque axes where these are at right angles.
         levels: (2,) second and third level of torque as shares of the first.
         period, duration: of control and of a torque, s.
         rate_limit: rad/s.
@@ -50,27 +59,123 @@ class OwnUnits(NamedTuple):
             >>> round(float(0.5 / 240 / 0.872 * units.momentum[0, 0]), 6)   # the largest pulse
             1.0
         """
-        inertia = context.inertia
-        tensor = jnp.diag(inertia) if inertia.ndim == 1 else inertia
-        strongest = context.torque_table[1 : 1 + 2 * AXES : 2]
-        each = jnp.sqrt(jnp.sum(context.torque_table[1 :: 2 * AXES] ** 2, axis=-1))
-        directions = strongest / each[0]
+        directions, levels = _axes_and_levels(context.torque_table)
         onto_axes = _reciprocal(directions)
-        impulse = each[0] * context.torque_duration
-        momentum = jnp.matmul(onto_axes, tensor, precision="highest") / impulse
+        impulse = levels[0] * context.torque_duration
+        momentum = _product(onto_axes, _tensor(context.inertia)) / impulse
         return cls(
             momentum=momentum,
             directions=directions,
-            shape=jnp.matmul(momentum, onto_axes.T, precision="highest"),
-            levels=each[1:] / each[0],
+            shape=_product(momentum, onto_axes.T),
+            levels=levels[1:] / levels[0],
             period=context.control_period,
             duration=context.torque_duration,
             rate_limit=context.rate_limit,
         )
 
 
+def rows(context: Context) -> chex.Array:
+    """(ACTIONS,) rows of a spacecraft's torque table: those that are chosen from, in order.
+
+    Axes are in ascending order of momentum, and right-handed, with the products of the first with
+    the others positive; levels are the largest, the one nearest to the middle of their logarithms,
+    and the smallest. Of fewer than three, one stands more than once.
+
+    Raises:
+        ValueError: the table is not one of three torque axes.
+
+    Example:
+        >>> from attjax import AttitudeEnv
+        >>> env = AttitudeEnv(frameskip=5)
+        >>> rows(env.context(env.default_params))[:7].tolist()   # y, z and x, up and down
+        [0, 3, 4, 5, 6, 1, 2]
+    """
+    count = len(context.torque_table) - 1
+    if count % (2 * AXES):
+        raise ValueError(f"the spacecraft has {count + 1} actions; they must be of {AXES} axes")
+    directions, levels = _axes_and_levels(context.torque_table)
+    order, signs = _order(_shape(directions, context.inertia), directions)
+    sign = jnp.array([1, -1])
+    is_down = (signs[:, None] * sign < 0).astype(jnp.int32)  # (axes, 2)
+    of_axis = 2 * order[:, None] + is_down
+    of_level = 2 * AXES * _three_of(levels)[:, None, None]
+    return jnp.concatenate([jnp.zeros(1, jnp.int32), (1 + of_level + of_axis).reshape(-1)])
+
+
+def check_axes(spacecraft: Spacecraft) -> None:
+    """Check that a spacecraft has units of its own.
+
+    Raises:
+        ValueError: it has more or fewer than three torque axes, or they lie in a plane.
+    """
+    axes = np.array(spacecraft.torque_axes, float)
+    if len(axes) != AXES:
+        raise ValueError(
+            f"{spacecraft} has {len(axes)} torque_axes; universal inputs are for {AXES}"
+        )
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    if abs(np.linalg.det(axes)) < FLATTEST:
+        raise ValueError(f"{spacecraft} has torque_axes in a plane; universal inputs need a space")
+
+
+def ordered(context: Context) -> Context:
+    """The context with the torques of :func:`rows` alone, in that order."""
+    return dataclasses.replace(context, torque_table=context.torque_table[rows(context)])
+
+
+def _three_of(levels):
+    """(3,) numbers of the largest level, of one between, and of the smallest."""
+    first, last = jnp.argmax(levels), jnp.argmin(levels)
+    if len(levels) <= 2:
+        return jnp.stack([first, last, last])
+    logarithms = jnp.log(levels)
+    between = abs(logarithms - 0.5 * (logarithms[first] + logarithms[last]))
+    numbers = jnp.arange(len(levels))
+    is_end = (numbers == first) | (numbers == last)
+    return jnp.stack([first, jnp.argmin(jnp.where(is_end, jnp.inf, between)), last])
+
+
+def _order(shape, directions):
+    """(3,) numbers of the axes in their order, and (3,) signs."""
+    moments, numbers = jnp.diagonal(shape), np.arange(AXES)
+    is_less = moments[None, :] < moments[:, None]
+    is_tied = (moments[None, :] == moments[:, None]) & (numbers[None, :] < numbers[:, None])
+    rank = jnp.sum(is_less | is_tied, axis=1)
+    order = jnp.argmax(rank[None, :] == numbers[:, None], axis=1).astype(jnp.int32)
+    sorted_shape = shape[order][:, order]
+    a, b, c = directions[order]
+    hand = jnp.where(_dot(a, jnp.cross(b, c)) < 0, -1, 1)
+    second, third = (jnp.where(sorted_shape[0, j] < 0, -1, 1) for j in (1, 2))
+    first = hand * second * third
+    return order, jnp.stack([first, first * second, first * third])
+
+
+def _axes_and_levels(torque_table):
+    """(3, 3) unit vectors, a row each, and the (levels,) torques about them, N m."""
+    first = torque_table[1 :: 2 * AXES]
+    levels = jnp.sqrt(first[:, 0] ** 2 + first[:, 1] ** 2 + first[:, 2] ** 2)
+    return torque_table[1 : 1 + 2 * AXES : 2] / levels[0], levels
+
+
+def _shape(directions, inertia):
+    onto_axes = _reciprocal(directions)
+    return _product(_product(onto_axes, _tensor(inertia)), onto_axes.T)
+
+
+def _tensor(inertia):
+    return jnp.diag(inertia) if inertia.ndim == 1 else inertia
+
+
+def _product(a, b):
+    return jnp.matmul(a, b, precision="highest")
+
+
 def _reciprocal(directions):
     """The matrix whose product with Σ pⱼ aⱼ is p."""
     a, b, c = directions
     rows = jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
-    return rows / jnp.sum(a * rows[0])
+    return rows / _dot(a, rows[0])
+
+
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

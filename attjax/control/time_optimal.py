@@ -1,6 +1,7 @@
 """How long a slew must take."""
 
 import chex
+import jax.numpy as jnp
 
 from attjax.control.classical import average_torque, momentum_to_give
 from attjax.dynamics import numerics
@@ -17,3 +18,23 @@ def time_optimal_reference(quaternion: chex.Array, context: Context) -> chex.Arr
     """
     angle = context.integral_of_rate(quaternions.rotation_vector(quaternion))
     return 2 * numerics.square_root(momentum_to_give(angle, context) / average_torque(context))
+
+
+def rate_limited_reference(quaternion: chex.Array, context: Context) -> chex.Array:
+    """The same where the rate limit is kept, about a fixed axis: accelerate, coast at it, brake.
+
+    Example:
+        >>> from attjax import AttitudeEnv
+        >>> env = AttitudeEnv(frameskip=5)
+        >>> context = env.context(env.default_params)
+        >>> turned = jnp.array([0.0, 0.7071068, 0.0, 0.7071068])   # 90° about y, in 2.9 s at best
+        >>> round(rate_limited_reference(turned, context).item(), 3)
+        3.832
+    """
+    angle = numerics.square_root(numerics.squared_norm(quaternions.rotation_vector(quaternion)))
+    angle = context.integral_of_rate(angle)
+    free = time_optimal_reference(quaternion, context)
+    limit = context.rate_limit
+    acceleration = 4 * angle / free**2
+    limited = angle / limit + limit / acceleration
+    return jnp.where(acceleration * free / 2 > limit, limited, free)

@@ -1,5 +1,8 @@
 """One spacecraft: its state, its parameters and what they may be (Table 1, section 2.3)."""
 
+import dataclasses
+from typing import Any
+
 import chex
 import jax
 import jax.numpy as jnp
@@ -101,6 +104,35 @@ def control_period(params: EnvParams, frameskip: int) -> chex.Array:
     frameskip = frameskip if params.frameskip is None else params.frameskip
     rk4_steps = jnp.asarray(1 + frameskip, jnp.asarray(params.inertia).dtype)
     return rk4_steps * INTEGRATION_STEP
+
+
+MATRICES = "inertia", "torque_table"
+"""Parameters of one spacecraft that have two axes; the others are numbers."""
+
+
+def fleet_axes(params: EnvParams) -> EnvParams:
+    """For ``vmap``: 0 where the spacecraft of a fleet differ, in None of the other parameters.
+
+    Those have a leading axis, and an inertia that differs is (spacecraft, 3, 3).
+
+    Example:
+        >>> limits = default_params().replace(rate_limit=jnp.array([0.3, 0.5]))
+        >>> fleet_axes(limits).rate_limit, fleet_axes(limits).inertia
+        (0, None)
+    """
+    given = {f.name: getattr(params, f.name) for f in dataclasses.fields(params)}
+    axes = {
+        name: 0 if np.ndim(x) > (2 if name in MATRICES else 0) else None
+        for name, x in given.items()
+        if name != "torque_held"
+    }
+    return params.replace(**axes)
+
+
+def of_fleet(params: EnvParams, rows: Any) -> EnvParams:
+    """The parameters of one spacecraft of a fleet, by its row, or of several, by a slice."""
+    axes = fleet_axes(params)
+    return jax.tree.map(lambda x, axis: x if axis is None else x[rows], params, axes)
 
 
 def check_params(params: EnvParams, frameskip: int) -> None:

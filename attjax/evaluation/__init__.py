@@ -2,6 +2,7 @@
 
 from attjax.evaluation.blocks import Episodes, Holding
 from attjax.evaluation.episodes import fly, random_slews
+from attjax.evaluation.fleets import evaluate_fleet
 from attjax.evaluation.flown import Controller
 from attjax.evaluation.history import History, record
 from attjax.evaluation.summary import (
@@ -22,6 +23,7 @@ __all__ = [
     "Holding",
     "conditions",
     "evaluate",
+    "evaluate_fleet",
     "fly",
     "random_slews",
     "record",

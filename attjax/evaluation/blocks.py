@@ -11,7 +11,7 @@ from flax import struct
 from attjax import sharding
 from attjax.dynamics import numerics
 from attjax.dynamics import quaternion as quaternions
-from attjax.envs import batch
+from attjax.envs import parameters
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.keys import steps_key
 from attjax.envs.parameters import EnvParams
@@ -80,7 +80,7 @@ def fly_blocks(
 
     Parameters in which the spacecraft differ have these two leading axes.
     """
-    axes = batch.param_axes(env, params)
+    axes = parameters.fleet_axes(params)
 
     def fly(controllers, params, keys):
         differing = jax.tree.map(lambda x, axis: None if axis is None else x, params, axes)
@@ -101,12 +101,12 @@ def _fly_block(env, judges_holding, controllers, params, keys):
     """Each controller's slews; the results have a row for each slew, and in it one for each."""
     slews, count = len(keys), len(controllers)
     reset_keys = jnp.concatenate([keys] * count)
-    axes = batch.param_axes(env, params)
+    axes = parameters.fleet_axes(params)
     params = jax.tree.map(
         lambda x, axis: x if axis is None else jnp.concatenate([x] * count), params, axes
     )
     observation, state = jax.vmap(env.reset, (0, axes))(reset_keys, params)
-    keys, first = jax.vmap(steps_key)(reset_keys), batch.params_of(env, params, 0)
+    keys, first = jax.vmap(steps_key)(reset_keys), parameters.of_fleet(params, 0)
     duration = env.context(first).torque_duration
     memory = flying.first_memory(controllers, flying.Flown(env, params), slews)
 

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from attjax import sharding
-from attjax.envs import batch
+from attjax.envs import parameters
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.parameters import EnvParams, EnvState
 from attjax.evaluation.blocks import Episodes, fly_blocks
@@ -25,8 +25,12 @@ SLEWS_A_CALL = 2**14
 def random_slews(
     env: AttitudeEnv, params: EnvParams, key: chex.PRNGKey, episodes: int
 ) -> tuple[chex.Array, EnvState]:
-    """Observations (episodes, 11) and states at the start of ``episodes`` random slews."""
-    return jax.vmap(env.reset, (0, None))(jax.random.split(key, episodes), params)
+    """Observations (episodes, 11) and states at the start of ``episodes`` random slews.
+
+    Parameters in which their spacecraft differ have a leading axis (episodes,).
+    """
+    axes = parameters.fleet_axes(params)
+    return jax.vmap(env.reset, (0, axes))(jax.random.split(key, episodes), params)
 
 
 def fly(
@@ -85,11 +89,11 @@ def _fly(controllers, env, params, key, how):
     keys = jax.random.split(key, episodes)
     calls = math.ceil(episodes / SLEWS_A_CALL)
     num_devices, blocks, size = _shape_of_call(math.ceil(episodes / calls), len(controllers))
-    a_call, flown, axes = num_devices * blocks * size, [], batch.param_axes(env, params)
+    a_call, flown, axes = num_devices * blocks * size, [], parameters.fleet_axes(params)
     for start in range(0, episodes, a_call):
         rows = np.arange(start, start + a_call) % episodes  # to fill the last
         part = keys[rows].reshape(num_devices * blocks, size)
-        theirs = _in_blocks(part.shape, axes, batch.params_of(env, params, rows))
+        theirs = _in_blocks(part.shape, axes, parameters.of_fleet(params, rows))
         block = fly_blocks(controllers, env, theirs, part, num_devices, judges_holding)
         flown.append(jax.device_get(block))
         if progress is not None:

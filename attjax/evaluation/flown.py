@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from attjax.control.flight_loop import FlightLoop, Memory
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import vectors
-from attjax.envs import batch
+from attjax.envs import parameters
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
 from attjax.envs.parameters import EnvParams, EnvState, measured
@@ -39,8 +39,8 @@ class Flown(NamedTuple):
 
     def each(self, function: Callable, rows: slice, *samples: Any) -> Any:
         """What ``function(*sample, context)`` gives of the samples of some of the slews."""
-        axes = batch.param_axes(self.env, self.params)
-        params = batch.params_of(self.env, self.params, rows)
+        axes = parameters.fleet_axes(self.params)
+        params = parameters.of_fleet(self.params, rows)
 
         def of_one(params, *sample):
             return function(*sample, self.env.context(params))
@@ -53,7 +53,7 @@ def first_memory(controllers: Crew, of: Flown, slews: int) -> Memory | None:
     loops = _loops(controllers)
     if not loops:
         return None
-    context = of.env.context(batch.params_of(of.env, of.params, 0))
+    context = of.env.context(parameters.of_fleet(of.params, 0))
     memory, count = loops[0].init(context), slews * len(loops)
     return jax.tree.map(lambda x: jnp.broadcast_to(x, (count, *jnp.shape(x))), memory)
 
@@ -129,5 +129,5 @@ def step(
     (keys, index), (memory, observation, state) = moment, before
     action, memory = decide(controllers, Flown(env, params), memory, observation, state)
     keys = jax.vmap(jax.random.fold_in, (0, None))(keys, index)
-    axes = batch.param_axes(env, params)
+    axes = parameters.fleet_axes(params)
     return memory, jax.vmap(env.step_env, (0, 0, 0, axes))(keys, state, action, params)

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from attjax.envs import batch
+from attjax.envs import parameters
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.keys import observation_key, steps_key
 from attjax.envs.parameters import EnvParams, EnvState
@@ -47,7 +47,7 @@ def record(
     Of slews of :func:`random_slews`, and with the same key, they are the flights of :func:`fly`.
     States that were put together without a world get one of the environment's.
     """
-    reset_keys, axes = jax.random.split(key, len(start.time)), batch.param_axes(env, params)
+    reset_keys, axes = jax.random.split(key, len(start.time)), parameters.fleet_axes(params)
     if start.plant is None:
         start = jax.vmap(placed, (None, 0, 0, axes))(env, reset_keys, start, params)
     observe = jax.vmap(env.observe, (0, 0, axes))

@@ -24,6 +24,12 @@ OTHER_ROWS = {
 }
 """Rows of the comparison; the paper has figures for the pointing only."""
 
+RATIOS = {
+    "settling over estimate": "settling_over_estimate",
+    "error over quantisation": "terminal_over_quantisation",
+}
+"""More of them, of a fleet."""
+
 TABLE_WIDTH = 100
 ROW_NAMES = ("Mean", "Std. dev.", "Min", "Q1", "Q2", "Q3", "Max")
 SYMBOLS = {"error_deg": "φ (°)", "rate_rad_s": "‖ω‖ (rad/s)"}
@@ -66,6 +72,10 @@ def print_comparison(results: list[dict], spacecraft: Spacecraft) -> None:
         values = [r[quantity][statistic] for r in results]
         form = ".3g" if quantity == "impulse_N_m_s" else ".2f"
         table.add_row(name, *("–" if x is None else format(x, form) for x in values))
+    for name, ratio in RATIOS.items():
+        if ratio in results[0]:
+            values = [r[ratio] for r in results]
+            table.add_row(name, *("–" if x is None else f"{x:.3f}" for x in values))
     out.print(table)
 
 
@@ -131,6 +141,14 @@ def _summary(result):
             (
                 f"{settling['mean']:.2f} s mean, {settling['q2']:.2f} s median, "
                 f"{settling['max']:.2f} s max; never: {settling['never']:,}"
+            ),
+        )
+    if result.get("settling_over_estimate"):
+        yield (
+            "beside estimates",
+            (
+                f"settling {result['settling_over_estimate']:.3f} of the estimate, "
+                f"error {result['terminal_over_quantisation']:.2f} of the quantisation"
             ),
         )
     yield "return", f"{returns['mean']:.1f} mean (Eq. 12-13)"

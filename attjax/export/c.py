@@ -104,7 +104,7 @@ def _source_values(flight, decision, prefix):
 
 
 def _inputs(flight: FlightPolicy) -> CInputs:
-    return FORMS[flight.policy.features].c(flight.control_period)
+    return FORMS[flight.policy.features].c(flight.context)
 
 
 def _weights(number, layer):

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from attjax.control import features
-from attjax.control.features import Multiscale
+from attjax.control.features import Multiscale, Universal
 from attjax.dynamics import quaternion as quaternions
+from attjax.envs.context import Context
 from attjax.export import c_text
 from attjax.export.c_text import Expression
 
@@ -35,20 +36,20 @@ class CInputs(NamedTuple):
 
 
 class Form(NamedTuple):
-    """How inputs are written down for one control period, a float32 in s.
+    """How inputs are written down for one context, a spacecraft in float32.
 
     Attributes:
-        c: (period) to CInputs.
-        onnx: (graph, period) to the name of the features among the graph's nodes.
+        c: (context) to CInputs.
+        onnx: (graph, context) to the name of the features among the graph's nodes.
     """
 
-    c: Callable[[np.float32], CInputs]
+    c: Callable[[Context], CInputs]
     onnx: Callable[..., str]
 
 
-def _state_in_c(period):
+def _state_in_c(context):
     """Eq. 9 by the very operations of quaternion.derivative."""
-    del period
+    del context
     quaternion = [Expression(f"q[{i}]") for i in range(4)]
     rate = quaternions.derivative(quaternion, [Expression(f"w[{i}]") for i in range(3)])
     lines = [f"    features[{i}] = {x.text};" for i, x in enumerate(rate, 4)]
@@ -56,9 +57,9 @@ def _state_in_c(period):
     return CInputs("features_state.c", values, constants=0, tanh=0, other=4 * 6)
 
 
-def _state_in_onnx(graph, period):
+def _state_in_onnx(graph, context):
     """Eq. 11: the quaternion's rate is a sum over the products of all qᵢ and ωⱼ."""
-    del period
+    del context
     shapes = {"column": [0, 4, 1], "row": [0, 1, 3], "products": [0, 12]}
     shapes = {k: graph.constant(f"{k}_shape", np.array(v, np.int64)) for k, v in shapes.items()}
     column = graph.add("Reshape", ["quaternion", shapes["column"]], "column")
@@ -76,8 +77,8 @@ def _kinematics():
     return np.array(rates) + 0.0  # no negative zeros
 
 
-def _multiscale_in_c(period):
-    numbers = Multiscale(period)
+def _multiscale_in_c(context):
+    numbers = _multiscale(context)
     count, tanh = len(numbers.scales), numbers.factors.shape[1]
     lines = [
         f"    features[6 * SCALES + {i}] = {c_text.number(x)};"
@@ -93,9 +94,13 @@ def _multiscale_in_c(period):
     return CInputs("features_multiscale.c", values, count, tanh, other=tanh + tanh // 2)
 
 
-def _multiscale_in_onnx(graph, period):
+def _multiscale(context):
+    return Multiscale(np.float32(context.control_period))
+
+
+def _multiscale_in_onnx(graph, context):
     """Tanh of the scaled attitude and rate; q_s and the constants of the control period."""
-    numbers = Multiscale(period)
+    numbers = _multiscale(context)
     attitude = graph.constant("attitude_factors", np.eye(4, 3) * numbers.attitude_factor)
     attitude = graph.add("MatMul", ["quaternion", attitude], "attitude")
     state = graph.add("Concat", [attitude, "angular_velocity"], "state", axis=1)
@@ -110,8 +115,51 @@ def _multiscale_in_onnx(graph, period):
     return graph.add("Concat", [scaled, plain], "features", axis=1)
 
 
+def _universal_in_c(context):
+    numbers, count = Universal.of(context), len(features.OWN_SCALES)
+    names = "of_vector", "of_rate", "momentum", "directions", "slowness", "constants"
+    arrays = {name: np.ravel(getattr(numbers, name)) for name in names}
+    arrays["scale_values"] = np.array(features.OWN_SCALES)
+    values = {name: c_text.table(x) for name, x in arrays.items()}
+    values |= {"scales": str(count), "constant_count": str(arrays["constants"].size)}
+    size = sum(x.size for x in arrays.values())
+    products = 6 * 9 + 3 * 4  # five products of a matrix, a sum of two, and roots
+    return CInputs("features_universal.c", values, size, 6 * count, 6 * count + products)
+
+
+def _universal_in_onnx(graph, context):
+    """Tanh of the scaled attitude and momentum in own units; the state and the constants."""
+    numbers = Universal.of(context)
+
+    def product(name, x, matrix):
+        rows = np.asarray(matrix).T
+        rows = np.vstack([rows, np.zeros(3)]) if x == "quaternion" else rows
+        return graph.add("MatMul", [x, graph.constant(f"{name}_rows", rows)], name)
+
+    parts = (
+        product("vector_part", "quaternion", numbers.of_vector),
+        product("rate_part", "angular_velocity", numbers.of_rate),
+    )
+    turn, one = graph.add("Add", [*parts], "turn"), graph.constant("one", np.ones(1))
+    larger = graph.add("Add", [graph.add("Abs", [turn], "size"), one], "larger")
+    shortened = graph.add("Div", [turn, graph.add("Sqrt", [larger], "root")], "shortened")
+    momentum = product("own_momentum", "angular_velocity", numbers.momentum)
+    own = graph.add("Concat", [shortened, momentum], "own", axis=1)
+    factors = graph.constant("scale_factors", numbers.factors)
+    fine = graph.add("Tanh", [graph.add("MatMul", [own, factors], "scaled")], "fine")
+    vector = product("vector", "quaternion", numbers.directions)
+    rate = product("rate", "angular_velocity", numbers.slowness)
+    nothing = graph.constant("nothing", np.zeros((4, numbers.constants.size)))
+    told = graph.constant("told", np.asarray(numbers.constants))
+    constants = graph.add("Gemm", ["quaternion", nothing, told], "constants")
+    last = graph.constant("last", np.eye(4)[:, 3:])
+    scalar = graph.add("MatMul", ["quaternion", last], "scalar")
+    return graph.add("Concat", [fine, vector, scalar, rate, constants], "features", axis=1)
+
+
 FORMS: dict[str | Callable, Form] = {
     "state": Form(_state_in_c, _state_in_onnx),
     "multiscale": Form(_multiscale_in_c, _multiscale_in_onnx),
+    "universal": Form(_universal_in_c, _universal_in_onnx),
 }
 """By name; a policy with other inputs is exported as StableHLO alone, which JAX writes."""

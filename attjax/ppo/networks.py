@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from attjax.control import assurance
+from attjax.control import assurance, own_units
 from attjax.control.features import FEATURES
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
@@ -86,8 +86,9 @@ class Policy:
     """A policy and its value function, two networks that share no parameters.
 
     Attributes:
-        features: "state", the observation as it is, "multiscale", or a function of an observation
-            (size,) and a context, to (features,).
+        features: of FEATURES by name, or a function of an observation (size,) and a context, to
+            (features,). Where they are "universal", actions are numbers of
+            :func:`attjax.control.own_units.rows` until they are commanded.
         hidden_sizes: neurons of each hidden layer.
         num_actions: how many a categorical policy chooses from.
         rate_margin: the fraction of the rate limit that :func:`attjax.control.assurance.rate_mask`
@@ -142,9 +143,18 @@ class Policy:
             return Inputs(features, None)
         allowed = jnp.ones(self.num_actions, bool)
         if self.rate_margin > 0:
+            context = own_units.ordered(context) if self._is_universal else context
             angular_velocity = observation[observations.ANGULAR_VELOCITY]
             allowed = assurance.rate_mask(context, self.rate_margin).allowed(angular_velocity)
         return Inputs(features, allowed)
+
+    @property
+    def _is_universal(self):
+        return self.features == "universal"
+
+    def command(self, action: chex.Array, context: Context) -> chex.Array:
+        """The spacecraft's action, a row of its torque table or (3,) fractions, of the policy's."""
+        return own_units.rows(context)[action] if self._is_universal else action
 
     def outputs(self, params: dict, inputs: Inputs) -> chex.Array:
         """(outputs, samples) of (samples, ...) inputs: logits are MASKED_LOGIT where masked."""
@@ -163,7 +173,8 @@ class Policy:
 
     def act(self, params: dict, observation: chex.Array, context: Context) -> chex.Array:
         """The most probable action for one observation: int32, or (3,) fractions."""
-        return self._decided(params, self.encode(observation, context), None)
+        decided = self._decided(params, self.encode(observation, context), None)
+        return self.command(decided, context)
 
     def draw(
         self, params: dict, key: chex.PRNGKey, observation: chex.Array, context: Context
@@ -175,7 +186,8 @@ class Policy:
         for word in jax.lax.bitcast_convert_type(observation.astype(jnp.float32), jnp.uint32):
             key = jax.random.fold_in(key, word)
         noise = self.distribution_family.noise(key, (), observation.dtype)
-        return self._decided(params, self.encode(observation, context), noise)
+        decided = self._decided(params, self.encode(observation, context), noise)
+        return self.command(decided, context)
 
     def _decided(self, params, inputs, noise):
         """The action for one spacecraft's inputs: drawn, or the mode where there is no noise."""

@@ -49,7 +49,8 @@ def rollout(setup: Setup, env_params: chex.ArrayTree, learner: Learner) -> tuple
         inputs = encode(env, policy, env_params, learner.observation)
         distribution = policy.distribution(learner.params, inputs)
         action = distribution.draw(noise, greedy)
-        learner, results = fly(env, env_params, learner, action, keys)
+        command = commanded(env, policy, env_params, action)
+        learner, results = fly(env, env_params, learner, command, keys)
         results["reward"] *= setup.settings.task.reward_scale
         log_probability = distribution.log_probability(action)
         return learner, Step(inputs, action, log_probability, **results)
@@ -114,6 +115,18 @@ def encode(env: Any, policy: Policy, env_params: chex.ArrayTree, observation: ch
 
     axes = batch.param_axes(env, env_params)
     return jax.vmap(encode_one, (0, axes))(observation, env_params)
+
+
+def commanded(
+    env: Any, policy: Policy, env_params: chex.ArrayTree, action: chex.Array
+) -> chex.Array:
+    """What the policy's actions, (envs, ...), command each spacecraft to do."""
+    axes = batch.param_axes(env, env_params)
+
+    def command_one(action, env_params):
+        return policy.command(action, env.context(env_params))
+
+    return jax.vmap(command_one, (0, axes))(action, env_params)
 
 
 def episode_sums(steps: Step, groups: list[slice]) -> dict[str, chex.Array]:

@@ -127,13 +127,38 @@ def init(setup: Setup, env_params: chex.ArrayTree, key: chex.PRNGKey) -> Learner
     return on_device(env_params, key)
 
 
+@functools.partial(jax.jit, static_argnames="setup", compiler_options=sharding.RUN_ONCE)
+def restarted(
+    setup: Setup, env_params: chex.ArrayTree, learner: Learner, key: chex.PRNGKey
+) -> Learner:
+    """The learner with all spacecraft, which may be others, at the start of an episode."""
+
+    def restart(env_params, learner, key):
+        observation, states = _starts(setup, env_params, key)
+        return learner.replace(
+            states=states,
+            observation=observation,
+            score=jnp.zeros_like(learner.score),
+            is_whole=setup.env.starts_whole(states),
+        )
+
+    specs = SHARED, LEARNER_SPECS, SHARED
+    on_device = sharding.on_devices(setup.num_devices, restart, specs, LEARNER_SPECS)
+    return on_device(env_params, learner, key)
+
+
+def _starts(setup, env_params, key):
+    """Observations and states of a device's spacecraft at the start of an episode."""
+    env, key = setup.env, jax.random.fold_in(key, jax.lax.axis_index(sharding.AXIS))
+    keys = jax.random.split(key, setup.envs_per_device)
+    start = functools.partial(_start, env, setup.settings.task.stagger_episodes)
+    return jax.vmap(start, (0, batch.param_axes(env, env_params)))(keys, env_params)
+
+
 def _init_on_device(setup, env_params, key):
     env, settings = setup.env, setup.settings
     key, policy_key, value_key, start_key = jax.random.split(key, 4)
-    start_key = jax.random.fold_in(start_key, jax.lax.axis_index(sharding.AXIS))
-    keys = jax.random.split(start_key, setup.envs_per_device)
-    start = functools.partial(_start, env, settings.task.stagger_episodes)
-    observation, states = jax.vmap(start, (0, batch.param_axes(env, env_params)))(keys, env_params)
+    observation, states = _starts(setup, env_params, start_key)
     context = env.context(batch.params_of(env, env_params, 0))
     params = setup.policy.init(policy_key, value_key, observation[0], context)
     adam = optimizer(settings.ppo)

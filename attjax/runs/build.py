@@ -12,9 +12,9 @@ import numpy as np
 from attjax.config import user_functions
 from attjax.config.run import Config
 from attjax.config.settings import Settings, Task
-from attjax.control import assurance
+from attjax.control import assurance, own_units
 from attjax.control.features import FEATURES
-from attjax.envs import initial_state, parameters
+from attjax.envs import fleet, initial_state, parameters
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.reward import REWARDS
 from attjax.errors import UserValueError
@@ -26,6 +26,9 @@ from attjax.world import IDEAL, World
 MAX_DEVICES = 8
 """Most devices of a run, a power of two as their number is."""
 
+FLEET_UPDATES = 32
+"""Updates for which the same spacecraft train, where any do."""
+
 MIN_SAMPLES = 512
 """Samples of a minibatch on a device below which sharing it out costs more than it gains."""
 
@@ -35,9 +38,15 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
 
     Raises:
         FunctionError: the features are a user's function that cannot be used.
+        UserValueError: they are universal, and the spacecraft not as these need it.
     """
     name = settings.network.features
     features: str | Callable = name
+    if name == "universal":
+        try:
+            own_units.check_axes(craft)
+        except ValueError as error:
+            raise UserValueError(str(error)) from None
     if name not in FEATURES:
         features = user_functions.resolve(name)
         call = functools.partial(jax.eval_shape, features, *_first_sight(craft))
@@ -46,7 +55,7 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
     return Policy(
         features,
         network.hidden_sizes,
-        craft.num_actions,
+        own_units.ACTIONS if features == "universal" else craft.num_actions,
         network.rate_margin,
         network.initial_weights,
         settings.task.actions,
@@ -81,8 +90,11 @@ def setup(
 
     Raises:
         FunctionError: the reward or the features are a user's function that cannot be used.
-        UserValueError: the rate mask leaves no torque, even at rest, or as :func:`environment`.
+        UserValueError: the rate mask leaves no torque, even at rest, the fleet's episodes are not
+            those of the spacecraft, or as :func:`environment` and :func:`policy`.
     """
+    if settings.task.any_spacecraft:
+        _check_fleet(settings, craft, world)
     reward = REWARDS.get(settings.task.reward) or user_functions.resolve(settings.task.reward)
     start = initial_state.initial_state
     if settings.task.near_goal_share > 0:
@@ -111,6 +123,20 @@ def of_config(config: Config) -> train_state.Setup:
     """
     devices = num_devices(config.settings)
     return setup(config.settings, config.spacecraft, devices, config.world)
+
+
+def _check_fleet(settings, craft, world):
+    """Spacecraft of a fleet have the paper's kind of actions, and nothing else is wrong."""
+    if settings.task.actions != "discrete":
+        raise UserValueError(f"any_spacecraft is for discrete actions, not {settings.task.actions}")
+    if craft.num_actions != LM50.num_actions or craft.torque_held:
+        kind = "held torques" if craft.torque_held else f"{craft.num_actions} actions"
+        raise UserValueError(
+            f"any_spacecraft draws spacecraft with {LM50.num_actions} actions, pulses; {craft}, "
+            f"whose episodes they fly, has {kind}"
+        )
+    if not world.is_ideal:
+        raise UserValueError(f"any_spacecraft is for the ideal world, not {world}")
 
 
 def _check_that_torques_are_left(settings, craft):
@@ -152,17 +178,20 @@ def num_devices(settings: Settings) -> int:
     return max(n for n in range(1, shared + 1) if shared % n == 0 and n <= most)
 
 
-def env_params(setup: train_state.Setup) -> parameters.EnvParams:
-    """The spacecraft's parameters, but for the cap on the episode's length.
+def env_params(setup: train_state.Setup, seed: int = 0, update: int = 0) -> parameters.EnvParams:
+    """The spacecraft's parameters in an update, but for the cap on the episode's length.
 
     Where actions are continuous, nothing masks them, and the rate limit is the margin of it that
     the mask would keep: a policy that learns to stay below it has room for its errors. With
-    several control rates, each group of spacecraft has its own.
+    several control rates, each group of spacecraft has its own. Where any spacecraft train, the
+    seed draws others for every FLEET_UPDATES updates.
     """
     settings, params = setup.settings, setup.env.default_params
     craft, margin = setup.env.spacecraft, settings.network.rate_margin
     if margin > 0 and settings.task.actions == "continuous":
         params = params.replace(rate_limit=margin * params.rate_limit)
+    if settings.task.any_spacecraft:
+        params = params.replace(**_fleet(setup, seed, update // FLEET_UPDATES))
     longest = [craft.max_steps(frameskip) for frameskip in settings.task.frameskips]
     limits = np.minimum(longest, settings.task.max_episode_steps).astype(np.int32)
     if setup.groups == 1:
@@ -172,6 +201,13 @@ def env_params(setup: train_state.Setup) -> parameters.EnvParams:
         max_steps_in_episode=jnp.asarray(limits[setup.group_of_row]),
         frameskip=jnp.asarray(frameskips[setup.group_of_row]),
     )
+
+
+def _fleet(setup, seed, number):
+    """The fleet of that number of a run, by the names of its parameters."""
+    frameskips = np.array(setup.settings.task.frameskips)[setup.group_of_row]
+    drawn = fleet.draw(np.random.default_rng([seed, number]), frameskips)
+    return {name: jnp.asarray(x, float) for name, x in drawn._asdict().items()}
 
 
 def initial_parameters(policy: Policy, craft: Spacecraft = LM50) -> dict:

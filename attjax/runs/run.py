@@ -35,7 +35,7 @@ class Run:
 
     def __init__(self, config: Config, setup: Setup):
         self.config, self.setup = config, setup
-        self.env_params = build.env_params(setup)
+        self.env_params = build.env_params(setup, config.seed)
         self.learner = train_state.init(setup, self.env_params, jax.random.key(config.seed))
         self.update, self.wall_s = 0, 0.0
         self.rows: list[dict] = []
@@ -44,6 +44,7 @@ class Run:
     def go_on_from(self, learner: Learner, rows: list[dict], wall_s: float) -> None:
         """Take a saved learner for the one that it has; its rows of metrics, and its clock."""
         self.learner, self.update = learner, int(learner.update)
+        self.env_params = build.env_params(self.setup, self.config.seed, self.update)
         self.rows, self.wall_s = list(rows), wall_s
 
     @property
@@ -109,6 +110,9 @@ class Run:
             self._clock = time.monotonic() - self.wall_s
         count = settings.logging.updates_per_block
         count = min(count, settings.ppo.num_updates - self.update)
+        if settings.task.any_spacecraft:
+            count = min(count, build.FLEET_UPDATES - self.update % build.FLEET_UPDATES)
+            self._renew_fleet()
         try:
             self.learner, block = train_block(self.env_params, self.learner, count)
         except nan_check.NotFinite as found:
@@ -123,6 +127,15 @@ class Run:
         row = metrics.block_row(block, settings.task.frameskips, self.agent_steps, self.wall_s)
         self.rows.append(metrics_file.cells(row))
         return row
+
+    def _renew_fleet(self):
+        """Other spacecraft, at the start of an episode, where their update has come."""
+        if self.update == 0 or self.update % build.FLEET_UPDATES:
+            return
+        seed = self.config.seed
+        self.env_params = build.env_params(self.setup, seed, self.update)
+        key = jax.random.fold_in(jax.random.key(seed), self.update)
+        self.learner = train_state.restarted(self.setup, self.env_params, self.learner, key)
 
     def _diverged(self, update, count, what):
         """One line that says in which of the updates what was not finite."""

@@ -44,11 +44,21 @@ WHEELS = Spacecraft(
     torque_held=True,
     duration=6.0,
 )
+SKEW = Spacecraft(
+    name="skew",
+    inertia=WHEELS.inertia,
+    torque_levels=(0.2, 0.1, 0.01),
+    torque_axes=((1, 0.2, 0), (0, -1, 0.1), (0.3, 0, 1)),
+    torque_held=True,
+    duration=6.0,
+)
 OTHERS = [
     ("state", (24, 8), 0.0),
     ("state", (16,), 0.99),
     ("multiscale", (8, 8, 8), 0.0),
     ("multiscale", (16,), 0.99, WHEELS),
+    ("universal", (8, 8), 0.99),
+    ("universal", (16,), 0.99, SKEW),
 ]
 
 
@@ -130,7 +140,13 @@ def test_the_c_test_program_notices_what_is_wrong(tmp_path, wrong):
 
 @needs_compiler
 @pytest.mark.parametrize(
-    "case", [("state", (24, 8), 0.0), ("multiscale", (8, 8, 8), 0.0), ("state", (8,), 0.99)]
+    "case",
+    [
+        ("state", (24, 8), 0.0),
+        ("multiscale", (8, 8, 8), 0.0),
+        ("state", (8,), 0.99),
+        ("universal", (8,), 0.99),
+    ],
 )
 def test_constants_and_stack_are_as_the_comment_says(tmp_path, case):
     """All the constants of the C source, added up by the compiler."""

@@ -1,0 +1,186 @@
+"""A spacecraft's own units, and the inputs and decisions that are made in them."""
+
+import dataclasses
+import itertools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from attjax import LM50, AttitudeEnv, EnvState, Spacecraft, step
+from attjax.control import features, own_units
+from attjax.control.own_units import OwnUnits
+from attjax.envs import observation
+from attjax.ppo.networks import Policy
+
+TURNED = Rotation.from_rotvec([0.4, -0.7, 0.2]).as_matrix()
+TENSOR = (TURNED @ np.diag([0.872, 0.115, 0.797]) @ TURNED.T).tolist()
+PULSES = Spacecraft(inertia=TENSOR)
+SKEW = Spacecraft(
+    inertia=TENSOR,
+    torque_levels=(0.03, 0.02, 0.001),
+    torque_axes=((1, 0.2, 0), (0, -1, 0.1), (0.3, 0, 1)),
+    torque_held=True,
+    rate_limit=0.3,
+)
+KINDS = pytest.mark.parametrize("craft", [LM50, PULSES, SKEW], ids=["lm50", "tensor", "skew"])
+ACTIONS = [(level, axis, sign) for level in range(3) for axis in range(3) for sign in (1, -1)]
+
+
+def context_of(craft, frameskip=5):
+    env = AttitudeEnv(frameskip, spacecraft=craft)
+    return env.context(env.default_params)
+
+
+@KINDS
+def test_the_largest_impulse_adds_one_about_its_axis(x64, craft):
+    context = context_of(craft)
+    units = OwnUnits.of(context)
+    inertia = np.asarray(context.inertia)
+    tensor = np.diag(inertia) if inertia.ndim == 1 else inertia
+    impulses = np.asarray(context.torque_table)[1:] * float(context.torque_duration)
+    momenta = np.linalg.solve(tensor, impulses.T).T @ np.asarray(units.momentum).T
+    shares = np.array(craft.torque_levels) / craft.torque_levels[0]
+    expected = [sign * shares[level] * np.eye(3)[axis] for level, axis, sign in ACTIONS]
+    np.testing.assert_allclose(momenta, expected, atol=1e-12)
+    np.testing.assert_allclose(units.levels, shares[1:])
+    axes = np.array(craft.torque_axes, float)
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    np.testing.assert_allclose(units.directions, axes)
+    impulse = craft.torque_levels[0] * float(context.torque_duration)
+    onto = np.linalg.inv(axes.T)
+    np.testing.assert_allclose(units.shape, onto @ tensor @ onto.T / impulse, rtol=1e-12)
+
+
+@pytest.mark.parametrize("frameskip", [5, 20])
+@KINDS
+def test_near_the_goal_every_spacecraft_is_the_same(x64, craft, frameskip):
+    """z grows by the momentum after the action, be it a pulse or held, at every rate."""
+    env = AttitudeEnv(frameskip, spacecraft=craft)
+    params = env.default_params
+    numbers = features.Universal.of(env.context(params))
+
+    def own(state):
+        z = numbers.of_vector @ state.quaternion[:3] + numbers.of_rate @ state.angular_velocity
+        return np.asarray(z), np.asarray(numbers.momentum @ state.angular_velocity)
+
+    scale = 1e-6
+    near = EnvState(jnp.array([2e-6, -1e-6, 3e-6, 1.0]), scale * jnp.array([1.0, 2.0, -1.0]), 0)
+    weak = params.replace(torque_table=params.torque_table * scale)
+    for action, (level, axis, sign) in enumerate(ACTIONS, 1):
+        (z, p), (later_z, later_p) = own(near), own(step(near, action, weak, frameskip))
+        share = craft.torque_levels[level] / craft.torque_levels[0]
+        kicked = p + scale * sign * share * np.eye(3)[axis]
+        np.testing.assert_allclose(later_p, kicked, atol=1e-4 * scale)
+        np.testing.assert_allclose(later_z, z + kicked, rtol=1e-5, atol=1e-4 * abs(kicked).max())
+
+
+def renamed(craft):
+    """The same spacecraft with its torque axes in all orders and both directions."""
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1, -1), repeat=3):
+            axes = [tuple(s * x for x in craft.torque_axes[n]) for n, s in zip(order, signs)]
+            yield dataclasses.replace(craft, torque_axes=tuple(axes))
+
+
+@KINDS
+def test_names_of_axes_change_nothing(craft):
+    """Inputs and the torque decided on are the same to the last bit but for -0.
+
+    A body in its principal axes has no products of inertia to tell a half turn of it by.
+    """
+    policy = Policy("universal", (8,), own_units.ACTIONS, 0.99)
+    state = observation.observe(jnp.array([0.3, -0.2, 0.4, 0.84]), jnp.array([0.02, -0.03, 0.01]))
+    params = policy.init(jax.random.key(1), jax.random.key(2), state, context_of(craft))
+    params["policy"]["params"]["Dense_1"]["kernel"] *= 100  # decisions that depend on the state
+    seen, torques = [], []
+    for same in renamed(craft):
+        context = context_of(same)
+        seen.append(features.universal_features(state, context))
+        torques.append(context.torque_table[policy.act(params, state, context)])
+    most = 4 if craft is LM50 else 1
+    assert len(np.unique(np.array(seen) + 0.0, axis=0)) == most
+    assert len(np.unique(np.array(torques) + 0.0, axis=0)) <= most and np.any(torques[0])
+
+
+def test_axes_are_in_order_and_right_handed(x64):
+    for craft in (LM50, PULSES, SKEW, *list(renamed(PULSES))[:8]):
+        context = own_units.ordered(context_of(craft))
+        units = OwnUnits.of(context)
+        shape = np.asarray(units.shape)
+        assert np.all(np.diff(np.diagonal(shape)) > 0)
+        assert np.linalg.det(units.directions) > 0 and min(shape[0, 1:]) >= 0
+        np.testing.assert_array_equal(own_units.rows(context), np.arange(own_units.ACTIONS))
+
+
+@pytest.mark.parametrize(
+    ("levels", "chosen"),
+    [
+        ((0.4,), (0.4, 0.4, 0.4)),
+        ((0.01, 0.4), (0.4, 0.01, 0.01)),
+        ((0.01, 0.4, 0.02), (0.4, 0.02, 0.01)),
+        ((0.3, 0.001, 0.2, 0.02, 0.002), (0.3, 0.02, 0.001)),
+    ],
+)
+def test_three_levels_are_chosen(levels, chosen):
+    context = own_units.ordered(context_of(Spacecraft(torque_levels=levels)))
+    sizes = np.linalg.norm(context.torque_table, axis=1)
+    np.testing.assert_allclose(sizes, [0, *np.repeat(chosen, 6)], rtol=1e-6)
+
+
+def test_spacecraft_without_three_axes_are_refused(as_users_run):
+    four = Spacecraft(torque_axes=((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)))
+    flat = Spacecraft(torque_axes=((1, 0, 0), (0, 1, 0), (1, 1, 0)))
+    with pytest.raises(ValueError, match="LM50 has 4 torque_axes; universal inputs are for 3"):
+        own_units.check_axes(four)
+    with pytest.raises(ValueError, match="LM50 has torque_axes in a plane"):
+        own_units.check_axes(flat)
+    with pytest.raises(ValueError, match="the spacecraft has 9 actions; they must be of 3 axes"):
+        own_units.rows(context_of(Spacecraft(torque_levels=(0.1,), torque_axes=four.torque_axes)))
+    own_units.check_axes(SKEW)
+
+
+@KINDS
+def test_universal_features_written_out(x64, craft):
+    context = own_units.ordered(context_of(craft, 11))
+    units, h, d = OwnUnits.of(context), 0.05, float(context.torque_duration)
+    q, w = np.array([0.3, -2e-3, 4e-6, 0.9]), np.array([0.2, -1e-4, 3e-7])
+    p, axes, shape = (np.asarray(x) for x in (units.momentum, units.directions, units.shape))
+    z = p @ (2 * q[:3]) / h + p @ w * d / (2 * h)
+    x = np.concatenate([z / np.sqrt(1 + abs(z)), p @ w])
+    moments = np.diagonal(shape)
+    slew = x / np.tile(np.sqrt(moments / h), 2)
+    expected = [np.tanh(4.0**n * component) for n in range(-5, 4) for component in x]
+    expected += [np.tanh(k * component) for k in (0.5, 1, 2, 4) for component in slew]
+    expected += [*axes @ q[:3], q[3], *axes @ w / craft.rate_limit]
+    expected += [*(np.log(moments / h) / 2 - 3)]
+    expected += [
+        shape[i, j] / np.sqrt(moments[i] * moments[j]) for i, j in ((0, 1), (0, 2), (1, 2))
+    ]
+    expected += [*(np.log(craft.rate_limit * moments) / 2 - 2.25)]
+    levels = np.array(craft.torque_levels)
+    expected += [*(np.log(levels[1:] / levels[0]) / 4 + 0.5), d / h, np.log(10 * h)]
+    observed = jnp.concatenate([q, np.full(4, 7.0), w])  # q̇ is not looked at
+    found = features.universal_features(observed, context_of(craft, 11))
+    assert found.shape == (98,)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_features_of_a_large_batch_are_those_of_small_ones():
+    """jaxlib 0.10.2 adds up rows beyond 2¹⁵ numbers wrongly on a CPU."""
+    rng = np.random.default_rng(0)
+    quaternion, rate = rng.normal(size=(12_000, 4)), rng.normal(0, 0.1, (12_000, 3))
+    observations = np.concatenate([quaternion, np.zeros((12_000, 4)), rate], axis=1)
+    observations = jnp.asarray(observations, jnp.float32)
+    context = context_of(LM50)
+    policy = Policy("universal", (8,), own_units.ACTIONS, 0.99)
+    encode = jax.jit(jax.vmap(lambda x: policy.encode(x, context)))
+    whole = encode(observations)
+    parts = [encode(observations[n : n + 300]) for n in range(0, 12_000, 300)]
+    np.testing.assert_allclose(
+        whole.features, np.concatenate([x.features for x in parts]), atol=1e-5
+    )
+    differing = whole.allowed != np.concatenate([x.allowed for x in parts])
+    assert np.sum(differing) <= 2  # at the very limit

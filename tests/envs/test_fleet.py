@@ -1,0 +1,81 @@
+"""Spacecraft drawn at random are spacecraft, and of the kinds that they are said to be."""
+
+import functools
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from attjax import Spacecraft
+from attjax.envs import fleet
+from attjax.spacecraft import INTEGRATION_STEP
+
+COUNT = 4000
+FRAMESKIPS = np.resize([5, 7, 10, 14, 20], COUNT)
+
+
+@functools.cache
+def drawn():
+    return fleet.draw(np.random.default_rng(3), FRAMESKIPS)
+
+
+def test_each_can_be_described():
+    spacecraft = drawn()
+    for inertia, table, limit in list(zip(*spacecraft))[:300]:
+        levels = np.linalg.norm(table[1::6], axis=1)
+        described = Spacecraft(
+            inertia=inertia.tolist(), torque_levels=levels.tolist(), rate_limit=float(limit)
+        )
+        np.testing.assert_allclose(described.torque_table, table, atol=1e-15)
+
+
+def test_moments_are_over_two_decades_and_turned_freely():
+    moments, axes = np.linalg.eigh(drawn().inertia)
+    assert moments.min() < 0.06 and 4 < moments.max() <= 5 and moments.min() >= 0.05 * (1 - 1e-9)
+    assert np.all(moments[:, 2] <= (moments[:, 0] + moments[:, 1]) * (1 + 1e-9))
+    off = np.abs(drawn().inertia[:, 0, 1]) > 0
+    assert np.mean(off) == pytest.approx(fleet.TURNED, abs=0.02)
+    # The largest moment's axis is uniform on the sphere: each cosine is uniform.
+    for cosine in np.abs(axes[off, :, 2]).T:
+        assert stats.kstest(cosine, "uniform").pvalue > 1e-4
+
+
+def test_slews_levels_and_limits_are_as_said():
+    spacecraft = drawn()
+    period = (FRAMESKIPS + 1) * INTEGRATION_STEP
+    levels = np.linalg.norm(spacecraft.torque_table[:, 1::6], axis=2)
+    moments = np.linalg.eigvalsh(spacecraft.inertia)
+    average = levels[:, 0] * INTEGRATION_STEP / period
+    duration = 2 * np.sqrt(np.pi / 2 * moments.mean(axis=1) / average)
+    periods = duration / period
+    low, high = fleet.QUARTER_TURN
+    assert low * (1 - 1e-9) <= periods.min() < 1.05 * low and periods.max() <= high * (1 + 1e-9)
+    assert duration.max() == pytest.approx(fleet.LONGEST)
+    shares = levels / levels[:, :1]
+    assert np.all(np.diff(shares, axis=1) <= 0) and shares.min() > 1 / (1.001 * fleet.STEPS**2)
+    usual = np.isclose(shares[:, 1], 0.1) & np.isclose(shares[:, 2], 0.01)
+    assert np.mean(usual) == pytest.approx(fleet.USUAL, abs=0.03)
+    coarse = np.isclose(shares[:, 1], 1)
+    assert np.mean(coarse) == pytest.approx(fleet.COARSE, abs=0.02)
+    assert np.mean(np.isclose(shares[:, 2], 1)) == pytest.approx(fleet.COARSE / 2, abs=0.015)
+    kick = levels[:, 0] * INTEGRATION_STEP / moments[:, 0]
+    assert np.all(spacecraft.rate_limit >= fleet.KICKS * kick * (1 - 1e-9))
+    assert np.all(spacecraft.rate_limit >= fleet.SLOWEST)
+    share = spacecraft.rate_limit * duration / np.pi
+    assert np.percentile(share, 5) < 0.5 and np.percentile(share, 95) > 2
+
+
+def test_turns_are_rotations():
+    turns = fleet.turns(np.random.default_rng(0), 50)
+    np.testing.assert_allclose(
+        turns @ turns.swapaxes(1, 2), np.tile(np.eye(3), (50, 1, 1)), atol=1e-12
+    )
+    np.testing.assert_allclose(np.linalg.det(turns), 1)
+
+
+def test_the_same_random_numbers_draw_the_same_spacecraft():
+    again = fleet.draw(np.random.default_rng(3), FRAMESKIPS)
+    other = fleet.draw(np.random.default_rng(4), FRAMESKIPS)
+    for x, y, z in zip(drawn(), again, other):
+        np.testing.assert_array_equal(x, y)
+        assert not np.allclose(x, z)
