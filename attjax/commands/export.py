@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Sequence
 
 from attjax import destinations, devices, errors
-from attjax.config import command_line, fields
+from attjax.config import command_line, fields, toml
 from attjax.export import c_names
 from attjax.runs import folder as run_folder
 
@@ -37,6 +37,8 @@ def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 def _add_what(group):
     command_line.add_checkpoint(group)
     command_line.add_best(group)
+    craft_help = "TOML file of what it is to fly, of a universal policy (default: as trained)"
+    group.add_argument("--spacecraft", type=command_line.path, metavar="FILE", help=craft_help)
     command_line.add_frameskip(group, "control rate of the flight software, 240/(N + 1) Hz")
     command_line.add_seed_and_device(group, "seed of the slews that test vectors come from")
 
@@ -120,8 +122,22 @@ def _flight_policy(arguments):
         frameskip = fields.frameskip_to_judge(config.settings.task.frameskips)
     with _exporting(folder):
         rules = build.rules(config.settings.task)
-        env = AttitudeEnv(frameskip, spacecraft=config.spacecraft, **rules)
+        env = AttitudeEnv(frameskip, spacecraft=_spacecraft(arguments, config), **rules)
         return FlightPolicy(policy, params, env, provenance.of_run(config, update, newest))
+
+
+def _spacecraft(arguments, config):
+    """What the policy is to fly; of a universal one with its torques in the policy's order."""
+    from attjax.control import own_units
+
+    is_universal, file = config.settings.network.features == "universal", arguments.spacecraft
+    if file is not None and not is_universal:
+        raise errors.UserError(
+            f"--spacecraft is for universal policies; the one in {arguments.checkpoint} flies "
+            f"{config.spacecraft} alone"
+        )
+    craft = config.spacecraft if file is None else toml.read_spacecraft(file)
+    return own_units.in_order(craft) if is_universal else craft
 
 
 @contextlib.contextmanager

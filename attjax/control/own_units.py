@@ -16,6 +16,7 @@ import chex
 import jax.numpy as jnp
 import numpy as np
 
+from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
 from attjax.spacecraft import Spacecraft
 
@@ -116,6 +117,28 @@ def check_axes(spacecraft: Spacecraft) -> None:
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     if abs(np.linalg.det(axes)) < FLATTEST:
         raise ValueError(f"{spacecraft} has torque_axes in a plane; universal inputs need a space")
+
+
+def in_order(spacecraft: Spacecraft) -> Spacecraft:
+    """The spacecraft with the torques of :func:`rows` alone, in that order.
+
+    Raises:
+        ValueError: as :func:`check_axes`.
+
+    Example:
+        >>> from attjax import LM50
+        >>> in_order(LM50).torque_axes
+        ((0, 1, 0), (0, 0, 1), (1, 0, 0))
+    """
+    check_axes(spacecraft)
+    env = AttitudeEnv(0, spacecraft=spacecraft)
+    chosen = np.asarray(rows(env.context(env.default_params))) - 1
+    levels = [spacecraft.torque_levels[n // (2 * AXES)] for n in chosen[1 :: 2 * AXES]]
+    axes = [
+        tuple(x if n % 2 == 0 else -x for x in spacecraft.torque_axes[n // 2])
+        for n in chosen[1 : 1 + 2 * AXES : 2] % (2 * AXES)
+    ]
+    return dataclasses.replace(spacecraft, torque_levels=tuple(levels), torque_axes=tuple(axes))
 
 
 def ordered(context: Context) -> Context:

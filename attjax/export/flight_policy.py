@@ -42,8 +42,9 @@ class FlightPolicy:
 
     Raises:
         ValueError: a parameter is not finite in float32, it is not one action alone that has no
-            torque, the simulator has another kind of actions than the policy, or other rules than
-            Eq. 9 and 11, which a spacecraft obeys.
+            torque, the simulator has another kind of actions than the policy, its torques are not
+            in a universal policy's order, or other rules than Eq. 9 and 11, which a spacecraft
+            obeys.
     """
 
     policy: Policy
@@ -60,6 +61,14 @@ class FlightPolicy:
         if self.env.actions != self.policy.actions:
             raise ValueError(
                 f"the simulator has {self.env.actions} actions, the policy {self.policy.actions}"
+            )
+        chosen = self.policy.command(np.arange(self.policy.num_actions), self.context)
+        if self.policy.actions == "discrete" and np.any(
+            chosen != np.arange(len(self.torque_table))
+        ):
+            raise ValueError(
+                f"{self.env.spacecraft} has torques in another order than the policy; export it "
+                f"for attjax.control.own_units.in_order of it"
             )
         arrays = [x for layer in _layers(self.params) for x in (layer.weights, layer.biases)]
         if not all(np.all(np.isfinite(x)) for x in arrays):

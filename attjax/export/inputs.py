@@ -116,15 +116,18 @@ def _multiscale_in_onnx(graph, context):
 
 
 def _universal_in_c(context):
-    numbers, count = Universal.of(context), len(features.OWN_SCALES)
-    names = "of_vector", "of_rate", "momentum", "directions", "slowness", "constants"
-    arrays = {name: np.ravel(getattr(numbers, name)) for name in names}
+    numbers = Universal.of(context)
+    arrays = {name: np.ravel(x) for name, x in numbers._asdict().items()}
     arrays["scale_values"] = np.array(features.OWN_SCALES)
+    arrays["slew_scale_values"] = np.array(features.SLEW_SCALES)
     values = {name: c_text.table(x) for name, x in arrays.items()}
-    values |= {"scales": str(count), "constant_count": str(arrays["constants"].size)}
-    size = sum(x.size for x in arrays.values())
+    counts = {"scales": "scale_values", "slew_scales": "slew_scale_values"}
+    counts |= {"constant_count": "constants"}
+    values |= {name: str(arrays[of].size) for name, of in counts.items()}
+    constants, tanh = sum(x.size for x in arrays.values()), numbers.factors.shape[1]
     products = 6 * 9 + 3 * 4  # five products of a matrix, a sum of two, and roots
-    return CInputs("features_universal.c", values, size, 6 * count, 6 * count + products)
+    other = tanh + 6 * len(features.SLEW_SCALES) + products
+    return CInputs("features_universal.c", values, constants, tanh, other)
 
 
 def _universal_in_onnx(graph, context):
@@ -145,6 +148,9 @@ def _universal_in_onnx(graph, context):
     shortened = graph.add("Div", [turn, graph.add("Sqrt", [larger], "root")], "shortened")
     momentum = product("own_momentum", "angular_velocity", numbers.momentum)
     own = graph.add("Concat", [shortened, momentum], "own", axis=1)
+    lengths = graph.constant("lengths", np.tile(np.asarray(numbers.lengths), 2))
+    over_length = graph.add("Div", [own, lengths], "over_length")
+    own = graph.add("Concat", [own, over_length], "both", axis=1)
     factors = graph.constant("scale_factors", numbers.factors)
     fine = graph.add("Tanh", [graph.add("MatMul", [own, factors], "scaled")], "fine")
     vector = product("vector", "quaternion", numbers.directions)

@@ -13,6 +13,8 @@ from attjax import LM50, AttitudeEnv, EnvState, Spacecraft, step
 from attjax.control import features, own_units
 from attjax.control.own_units import OwnUnits
 from attjax.envs import observation
+from attjax.export.flight_policy import FlightPolicy
+from attjax.export.provenance import Origin
 from attjax.ppo.networks import Policy
 
 TURNED = Rotation.from_rotvec([0.4, -0.7, 0.2]).as_matrix()
@@ -115,6 +117,14 @@ def test_axes_are_in_order_and_right_handed(x64):
         np.testing.assert_array_equal(own_units.rows(context), np.arange(own_units.ACTIONS))
 
 
+def test_a_spacecraft_in_order_flies_by_the_same_torques(x64):
+    for craft in (LM50, SKEW, Spacecraft(torque_levels=(0.01, 0.4, 0.1, 0.02))):
+        context, same = context_of(craft), context_of(own_units.in_order(craft))
+        chosen = context.torque_table[own_units.rows(context)]
+        np.testing.assert_allclose(same.torque_table, chosen, atol=1e-15)
+        np.testing.assert_array_equal(own_units.rows(same), np.arange(own_units.ACTIONS))
+
+
 @pytest.mark.parametrize(
     ("levels", "chosen"),
     [
@@ -184,3 +194,14 @@ def test_features_of_a_large_batch_are_those_of_small_ones():
     )
     differing = whole.allowed != np.concatenate([x.allowed for x in parts])
     assert np.sum(differing) <= 2  # at the very limit
+
+
+def test_an_export_is_of_torques_in_order():
+    env = AttitudeEnv(5)
+    policy = Policy("universal", (8,), own_units.ACTIONS, 0.99)
+    state = observation.observe(jnp.array([0.0, 0.0, 0.0, 1.0]), jnp.zeros(3))
+    keys = jax.random.split(jax.random.key(0))
+    params = policy.init(*keys, state, env.context(env.default_params))
+    with pytest.raises(ValueError, match="LM50 has torques in another order than the policy"):
+        FlightPolicy(policy, params, env, Origin("no training"))
+    FlightPolicy(policy, params, AttitudeEnv(5, spacecraft=own_units.in_order(LM50)), Origin("no"))

@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 
 from attjax import AttitudeEnv
+from attjax.control import own_units
 from attjax.evaluation import paper
 from attjax.export import c as export_c
 from attjax.export import flight_check, provenance
@@ -39,13 +40,16 @@ def load(folder: Path, frameskip: int) -> FlightPolicy:
     """The newest policy of a run folder, to fly at this rate."""
     policy, params = checkpoint.restore_network(folder)
     config, update = run_folder.read_config(folder), checkpoint.latest(folder)
-    env = AttitudeEnv(frameskip, spacecraft=config.spacecraft)
+    is_universal = policy.features == "universal"
+    craft = own_units.in_order(config.spacecraft) if is_universal else config.spacecraft
+    env = AttitudeEnv(frameskip, spacecraft=craft)
     return FlightPolicy(policy, params, env, provenance.of_run(config, update, update))
 
 
 @functools.cache
 def untrained(features, hidden_sizes, rate_margin, spacecraft=LM50) -> FlightPolicy:
     """Random weights, and biases too, that leave the decision to the state."""
+    spacecraft = own_units.in_order(spacecraft) if features == "universal" else spacecraft
     policy = Policy(features, hidden_sizes, spacecraft.num_actions, rate_margin)
     shapes = jax.eval_shape(lambda: build.initial_parameters(policy)["policy"])
     leaves, tree = jax.tree.flatten(shapes)

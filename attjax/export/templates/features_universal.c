@@ -1,12 +1,17 @@
 #define SCALES $scales
+#define SLEW_SCALES $slew_scales
 
-/* Factors of the state: the first resolves the slew, the last its end. */
+/* Factors of the state in the spacecraft's own units, and over a slew's length. */
 static const float scales[SCALES] = $scale_values;
+static const float slew_scales[SLEW_SCALES] = $slew_scale_values;
 
 /* The spacecraft's own units: its largest impulse is 1, its control period is 1. */
 static const float of_vector[9] = $of_vector;
 static const float of_rate[9] = $of_rate;
 static const float momentum[9] = $momentum;
+
+/* Length of a turn of 1 rad about each torque axis, in control periods. */
+static const float lengths[3] = $lengths;
 
 /* Directions of the torque axes; the same over the rate limit; what kind of spacecraft it is. */
 static const float directions[9] = $directions;
@@ -20,13 +25,13 @@ static float product(const float row[3], const float x[3])
 
 /*
  * tanh(k x) for every scale k, of the turn z to the goal as z / sqrt(1 + |z|) and of the momentum,
- * both in the spacecraft's own units and along its torque axes; then the attitude, and the rate over
- * its limit, along these axes, and the constants.
+ * both in the spacecraft's own units and along its torque axes; the same over a slew's length; then
+ * the attitude, and the rate over its limit, along these axes, and the constants.
  */
 static void features_of(const float q[4], const float w[3], float features[FEATURES])
 {
     float own[6];
-    float *rest = features + 6 * SCALES;
+    float *slew = features + 6 * SCALES, *rest = slew + 6 * SLEW_SCALES;
     for (int i = 0; i < 3; i++) {
         const float z = product(of_vector + 3 * i, q) + product(of_rate + 3 * i, w);
         own[i] = z / sqrtf(1.0f + fabsf(z));
@@ -41,6 +46,11 @@ static void features_of(const float q[4], const float w[3], float features[FEATU
     for (int s = 0; s < SCALES; s++) {
         for (int i = 0; i < 6; i++) {
             features[6 * s + i] = tanhf(scales[s] * own[i]);
+        }
+    }
+    for (int s = 0; s < SLEW_SCALES; s++) {
+        for (int i = 0; i < 6; i++) {
+            slew[6 * s + i] = tanhf(slew_scales[s] * (own[i] / lengths[i % 3]));
         }
     }
 }

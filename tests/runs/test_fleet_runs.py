@@ -1,0 +1,96 @@
+"""Training on a fleet: which spacecraft fly when, and that a run that stopped goes on the same."""
+
+import jax
+import numpy as np
+import pytest
+
+import attjax
+from attjax.config import run as run_config
+from attjax.errors import UserValueError
+from attjax.ppo import train_state
+from attjax.runs import build
+from attjax.runs.keeper import Place
+from attjax.spacecraft import Spacecraft
+
+SMALL = {
+    "frameskips": (1, 3), "num_envs": 8, "rollout_length": 2, "minibatch_size": 8, "passes": 1,
+    "hidden_sizes": (4,), "updates_per_block": 5, "total_steps": 8 * 2 * 36,
+}  # fmt: skip
+
+
+def trained(folder=None, stop_after=None, **values):
+    def stops(row):
+        return stop_after is not None and row["agent_steps"] >= 16 * stop_after
+
+    return attjax.train("universal", folder=folder, callback=stops, **SMALL | values)
+
+
+def test_a_fleet_flies_for_32_updates():
+    setup = build.of_config(run_config.new("universal", **SMALL))
+    first, same, second = (build.env_params(setup, 7, n) for n in (0, 31, 32))
+    other = build.env_params(setup, 8, 0)
+    np.testing.assert_array_equal(first.inertia, same.inertia)
+    rows = setup.envs_per_device
+    for params in (first, second, other):
+        assert params.inertia.shape == (rows, 3, 3) and params.rate_limit.shape == (rows,)
+        assert params.torque_table.shape == (rows, 19, 3)
+    assert not np.any(np.isclose(first.inertia[:, 0, 0], second.inertia[:, 0, 0]))
+    assert not np.any(np.isclose(first.inertia[:, 0, 0], other.inertia[:, 0, 0]))
+
+
+def test_blocks_end_where_a_fleet_does():
+    """With blocks of five updates the seventh has two; then all start an episode anew."""
+    steps = []
+
+    def seen(row):
+        steps.append(row["agent_steps"] // 16)
+
+    run = attjax.train("universal", callback=seen, **SMALL)
+    assert steps == [5, 10, 15, 20, 25, 30, 32, 36]
+    expected = build.env_params(run.setup, 0, 32)
+    np.testing.assert_array_equal(run.env_params.inertia, expected.inertia)
+
+
+@pytest.mark.parametrize("stop_after", [30, 32, 36])
+def test_a_run_that_stopped_goes_on_the_same(tmp_path, stop_after):
+    whole = trained(total_steps=8 * 2 * 42)
+    trained(tmp_path, stop_after, total_steps=8 * 2 * 42)
+    resumed = attjax.train(folder=Place(folder=tmp_path, resume=True))
+    for a, b in zip(*map(jax.tree.leaves, (whole.learner.params, resumed.learner.params))):
+        np.testing.assert_array_equal(a, b)
+    np.testing.assert_array_equal(whole.learner.states.time, resumed.learner.states.time)
+    np.testing.assert_array_equal(whole.env_params.inertia, resumed.env_params.inertia)
+
+
+def test_all_start_anew_with_a_fleet():
+    run = trained(stop_after=5, stagger_episodes=False, near_goal_share=0.0)
+    params = build.env_params(run.setup, 0, 32)
+    assert np.all(np.asarray(run.learner.states.time) > 0)
+    anew = train_state.restarted(run.setup, params, run.learner, jax.random.key(1))
+    assert not np.any(np.asarray(anew.states.angular_velocity)) and np.all(anew.is_whole)
+    assert not np.any(anew.score) and not np.any(np.asarray(anew.states.time))
+    np.testing.assert_allclose(anew.observation[:, :4], anew.states.quaternion)
+    assert len(np.unique(anew.observation[:, 3])) == SMALL["num_envs"]
+    for a, b in zip(*map(jax.tree.leaves, (run.learner.params, anew.params))):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"actions": "continuous"}, "any_spacecraft is for discrete actions, not continuous"),
+        ({"world": "stress"}, "any_spacecraft is for the ideal world, not stress"),
+        ({"spacecraft": Spacecraft(torque_held=True)}, "LM50, whose episodes they fly, has held"),
+        (
+            {"spacecraft": Spacecraft(torque_levels=(0.1,))},
+            "19 actions, pulses; LM50, whose episodes they fly, has 7 actions",
+        ),
+        (
+            {"spacecraft": Spacecraft(torque_axes=((1, 0, 0), (0, 1, 0))), "any_spacecraft": False},
+            "LM50 has 2 torque_axes; universal inputs are for 3",
+        ),
+    ],
+)
+def test_what_a_fleet_cannot_be_is_refused(values, said):
+    with pytest.raises(UserValueError, match=said):
+        trained(**values)
