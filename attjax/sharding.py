@@ -7,7 +7,7 @@ from typing import Any
 
 import jax
 import numpy as np
-from jax.sharding import Mesh, PartitionSpec
+from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 AXIS = "devices"
 SHARED, SPLIT = PartitionSpec(), PartitionSpec(AXIS)
@@ -43,6 +43,14 @@ def devices() -> Sequence[jax.Device]:
 def mesh(num_devices: int) -> Mesh:
     """The first devices, as one axis."""
     return Mesh(np.array(devices()[:num_devices]), (AXIS,))
+
+
+def shared(tree: Any, num_devices: int) -> Any:
+    """The same arrays on the first devices, wherever they are: saved ones are put on one of them.
+
+    JAX refuses a program for several devices arguments that were put on one.
+    """
+    return jax.device_put(tree, NamedSharding(mesh(num_devices), SHARED))
 
 
 def on_devices(num_devices: int, function: Callable, in_specs: Any, out_specs: Any) -> Callable:

@@ -5,7 +5,7 @@ from pathlib import Path
 import jax
 import pytest
 
-from attjax import AttitudeEnv, evaluation
+from attjax import AttitudeEnv, Spacecraft, evaluation, load_flight_loop
 from attjax.evaluation.paper import PAPER_TABLE_2
 from attjax.runs import checkpoint
 
@@ -42,3 +42,13 @@ def test_the_papers_reward_brings_its_return_and_not_its_table_2(name, success, 
     papers_mean = PAPER_TABLE_2["terminal", "error_deg"][0]
     assert result["terminal"]["error_deg"]["min"] > papers_mean
     assert result["terminal_success"]["error_deg"]["mean"] > 50 * papers_mean
+
+
+def test_a_saved_policy_in_a_flight_loop_flies_on_both_devices():
+    """More slews than one device is given, of parameters that were read onto one."""
+    env = AttitudeEnv(20, spacecraft=Spacecraft(duration=3))
+    loop = load_flight_loop(PRETRAINED / "precise")
+    assert len(jax.devices()) == 2
+    slews = evaluation.fly(loop, env, env.default_params, jax.random.key(1), 600)
+    alone = evaluation.fly(loop.controller, env, env.default_params, jax.random.key(1), 600)
+    assert (slews.terminal_angle == alone.terminal_angle).all()

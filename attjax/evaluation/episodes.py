@@ -89,6 +89,7 @@ def _fly(controllers, env, params, key, how):
     keys = jax.random.split(key, episodes)
     calls = math.ceil(episodes / SLEWS_A_CALL)
     num_devices, blocks, size = _shape_of_call(math.ceil(episodes / calls), len(controllers))
+    controllers = sharding.shared(controllers, num_devices)
     a_call, flown, axes = num_devices * blocks * size, [], parameters.fleet_axes(params)
     for start in range(0, episodes, a_call):
         rows = np.arange(start, start + a_call) % episodes  # to fill the last
