@@ -96,7 +96,7 @@ def test_settings_and_spacecraft_of_ones_own():
     [
         (
             {"preset": "fast"},
-            "preset is 'fast'; it must be one of precise, precise-gpu, paper",
+            "preset is 'fast'; it must be one of precise, precise-gpu, universal",
         ),
         ({"gravity": 1}, "unknown or missing: gravity"),
         ({"num_envs": 0}, "num_envs is 0; it must be an integer at least 1"),

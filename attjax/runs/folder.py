@@ -30,7 +30,7 @@ try:
 except ImportError:  # Windows, where runs are not kept apart
     fcntl = None
 
-FORMAT = 9
+FORMAT = 10
 CONFIG, METRICS = belongings.CONFIG, belongings.METRICS
 LOST = "lost+found"
 
@@ -195,22 +195,20 @@ def read_config(folder: Path) -> Config:
         raise FolderError(f"{path} cannot be read: {error!r}") from None
 
 
-def _with_a_world(content):
-    """Format 8 had the ideal world only."""
-    return content | {"format": FORMAT, "world": IDEAL.table()}
-
-
-def _with_later_settings(content):
-    """Formats 6 and 7 had fewer settings, and format 5 had them in one table."""
-    given = content["settings"]
-    if content["format"] > 5:
+def _upgraded(content):
+    """Format 9 had fewer settings, up to format 8 there was the ideal world only, up to format 7 still
+    fewer settings, and format 5 had them in one table.
+    """
+    version, given = content["format"], content["settings"]
+    if version > 5:
         given = {name: x for subject in given.values() for name, x in subject.items()}
     later = {name: f.metadata["before"] for name, f in FIELDS.items() if "before" in f.metadata}
     by_subject = dataclasses.asdict(settings.from_flat(later | given))
-    return _with_a_world(content) | {"settings": by_subject}
+    world = {} if version > 8 else {"world": IDEAL.table()}
+    return content | world | {"format": FORMAT, "settings": by_subject}
 
 
-UPGRADES = dict.fromkeys((5, 6, 7), _with_later_settings) | {8: _with_a_world}
+UPGRADES = dict.fromkeys(range(5, FORMAT), _upgraded)
 """What makes the content of an earlier format one of the present format."""
 
 

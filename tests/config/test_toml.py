@@ -56,7 +56,7 @@ def test_a_printed_file_reproduces_the_run_and_agrees_with_resuming_it(trained, 
         ("seed = -1", "seed is -1; it must be an integer at least 0 and below 4294967296"),
         (
             'preset = "best"',
-            "preset is 'best'; it must be one of precise, precise-gpu, paper",
+            "preset is 'best'; it must be one of precise, precise-gpu, universal",
         ),
         ("preset = [[1]]", "it must be one of precise"),
         ("settings = 3", "settings must be a table"),
