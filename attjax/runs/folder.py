@@ -196,8 +196,8 @@ def read_config(folder: Path) -> Config:
 
 
 def _upgraded(content):
-    """Format 9 had fewer settings, up to format 8 there was the ideal world only, up to format 7 still
-    fewer settings, and format 5 had them in one table.
+    """Format 9 had fewer settings, 7 still fewer, and 5 had them in one table; up to format 8 there
+    was the ideal world only.
     """
     version, given = content["format"], content["settings"]
     if version > 5:
