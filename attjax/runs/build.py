@@ -38,11 +38,13 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
 
     Raises:
         FunctionError: the features are a user's function that cannot be used.
-        UserValueError: they are universal, and the spacecraft not as these need it.
+        UserValueError: they are universal, and the actions or the spacecraft not as they need it.
     """
     name = settings.network.features
     features: str | Callable = name
     if name == "universal":
+        if settings.task.actions != "discrete":
+            raise UserValueError("universal features are for discrete actions, not continuous ones")
         try:
             own_units.check_axes(craft)
         except ValueError as error:

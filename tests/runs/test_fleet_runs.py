@@ -79,6 +79,10 @@ def test_all_start_anew_with_a_fleet():
     ("values", "said"),
     [
         ({"actions": "continuous"}, "any_spacecraft is for discrete actions, not continuous"),
+        (
+            {"actions": "continuous", "any_spacecraft": False},
+            "universal features are for discrete actions",
+        ),
         ({"world": "stress"}, "any_spacecraft is for the ideal world, not stress"),
         ({"spacecraft": Spacecraft(torque_held=True)}, "LM50, whose episodes they fly, has held"),
         (
