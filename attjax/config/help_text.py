@@ -45,7 +45,7 @@ def defaults(name: str) -> str:
         >>> defaults("clip")
         'default: 0.2'
         >>> defaults("discount")
-        'precise, precise-gpu, continuous: 0.995; paper, paper-gae, paper-fast: 0.99'
+        'precise, precise-gpu, universal, continuous: 0.995; paper, paper-gae, paper-fast: 0.99'
     """
     presets_of: dict[str, list[str]] = {}
     for preset, values in presets.PRESETS.items():
