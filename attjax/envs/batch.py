@@ -29,10 +29,10 @@ def param_axes(env: Any, params: chex.ArrayTree) -> Any:
     )
 
 
-def params_of(env: Any, params: chex.ArrayTree, rows: Any) -> chex.ArrayTree:
-    """The parameters of one spacecraft of a batch, by its row; or of several, by a slice."""
+def params_of(env: Any, params: chex.ArrayTree, row: chex.Numeric) -> chex.ArrayTree:
+    """The parameters of one spacecraft of a batch."""
     axes = param_axes(env, params)
-    return jax.tree.map(lambda x, axis: x if axis is None else x[rows], params, axes)
+    return jax.tree.map(lambda x, axis: x if axis is None else x[row], params, axes)
 
 
 def step(

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from attjax.dynamics import vectors
 from attjax.spacecraft import INTEGRATION_STEP, Spacecraft
 
 MOMENTS = 0.05, 5.0
@@ -21,7 +22,7 @@ QUARTER_TURN = 40, 800
 """Control periods that a rest-to-rest turn of 90° about a mean moment would take at least."""
 
 LONGEST = 15.0
-"""The same in seconds, at most: slews of 150° about the worst axis are then done within 40 s."""
+"""The same in seconds, at most; 150° about the worst axis may still take longer than 43.75 s."""
 
 LIMIT = 0.25, 4.0
 """Rate limit, as a share of the peak rate of that turn."""
@@ -90,13 +91,8 @@ def principal_moments(random: np.random.Generator, count: int) -> np.ndarray:
 def turns(random: np.random.Generator, count: int) -> np.ndarray:
     """(count, 3, 3) rotation matrices, uniformly distributed."""
     normal = random.normal(size=(count, 4, 1))
-    x, y, z, w = np.moveaxis(normal / np.linalg.norm(normal, axis=1, keepdims=True), 1, 0)[..., 0]
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
+    unit = np.moveaxis(normal / np.linalg.norm(normal, axis=1, keepdims=True), 1, 0)[..., 0]
+    return np.array(vectors.attitude_matrix(tuple(unit))).T
 
 
 def _log_uniform(random, bounds, shape):
