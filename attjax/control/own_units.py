@@ -6,7 +6,8 @@ the axes. With I θ = J h Σ yⱼ aⱼ, where θ is the turn to the goal, near i
 Torques that last for d move it by p d/2h less; z = y + p d/2h grows as if they came at once.
 
 Spacecraft that differ in the names of their axes alone are the same, too: the axes are put into an
-order, by the momentum that a turn about each takes, and so are the torques.
+order, by the momentum that a turn about each takes, and so are the torques; and so are states that
+differ in which way is called forward about an axis.
 """
 
 import dataclasses
@@ -49,6 +50,12 @@ class OwnUnits(NamedTuple):
     duration: chex.Numeric
     rate_limit: chex.Array
 
+    @property
+    def hand(self) -> chex.Array:
+        """1 where the axes are right-handed, else -1."""
+        a, b, c = self.directions
+        return jnp.where(_dot(a, jnp.cross(b, c)) < 0, -1, 1)
+
     @classmethod
     def of(cls, context: Context) -> "OwnUnits":
         """The units of a spacecraft with ACTIONS torques in the order of Table 1.
@@ -78,9 +85,8 @@ class OwnUnits(NamedTuple):
 def rows(context: Context) -> chex.Array:
     """(ACTIONS,) rows of a spacecraft's torque table: those that are chosen from, in order.
 
-    Axes are in ascending order of momentum, and right-handed, with the products of the first with
-    the others positive; levels are the largest, the one nearest to the middle of their logarithms,
-    and the smallest. Of fewer than three, one stands more than once.
+    Axes are in ascending order of momentum; levels are the largest, the one nearest to the middle
+    of their logarithms, and the smallest. Of fewer than three, one stands more than once.
 
     Raises:
         ValueError: the table is not one of three torque axes.
@@ -95,12 +101,29 @@ def rows(context: Context) -> chex.Array:
     if count % (2 * AXES):
         raise ValueError(f"the spacecraft has {count + 1} actions; they must be of {AXES} axes")
     directions, levels = _axes_and_levels(context.torque_table)
-    order, signs = _order(_shape(directions, context.inertia), directions)
-    sign = jnp.array([1, -1])
-    is_down = (signs[:, None] * sign < 0).astype(jnp.int32)  # (axes, 2)
-    of_axis = 2 * order[:, None] + is_down
+    of_axis = 2 * _order(_shape(directions, context.inertia))[:, None] + jnp.arange(2)
     of_level = 2 * AXES * _three_of(levels)[:, None, None]
     return jnp.concatenate([jnp.zeros(1, jnp.int32), (1 + of_level + of_axis).reshape(-1)])
+
+
+def turned_back(outputs: chex.Array, backward: chex.Array) -> chex.Array:
+    """Numbers of ACTIONS, of which those up and down about some axes have changed places.
+
+    Args:
+        outputs: (ACTIONS, samples), in the order of :func:`rows`.
+        backward: (samples, 3) bool, whether they changed about each axis.
+
+    Returns:
+        (ACTIONS, samples) with all in their own places.
+
+    Example:
+        >>> outputs = jnp.arange(19)[:, None]
+        >>> turned_back(outputs, jnp.array([[True, False, False]]))[:7, 0].tolist()
+        [0, 2, 1, 3, 4, 5, 6]
+    """
+    of_axes = outputs[1:].reshape(LEVELS, AXES, 2, -1)
+    of_axes = jnp.where(backward.T[:, None], of_axes[:, :, ::-1], of_axes)
+    return jnp.concatenate([outputs[:1], of_axes.reshape(ACTIONS - 1, -1)])
 
 
 def check_axes(spacecraft: Spacecraft) -> None:
@@ -158,19 +181,13 @@ def _three_of(levels):
     return jnp.stack([first, jnp.argmin(jnp.where(is_end, jnp.inf, between)), last])
 
 
-def _order(shape, directions):
-    """(3,) numbers of the axes in their order, and (3,) signs."""
+def _order(shape):
+    """(3,) numbers of the axes in their order."""
     moments, numbers = jnp.diagonal(shape), np.arange(AXES)
     is_less = moments[None, :] < moments[:, None]
     is_tied = (moments[None, :] == moments[:, None]) & (numbers[None, :] < numbers[:, None])
     rank = jnp.sum(is_less | is_tied, axis=1)
-    order = jnp.argmax(rank[None, :] == numbers[:, None], axis=1).astype(jnp.int32)
-    sorted_shape = shape[order][:, order]
-    a, b, c = directions[order]
-    hand = jnp.where(_dot(a, jnp.cross(b, c)) < 0, -1, 1)
-    second, third = (jnp.where(sorted_shape[0, j] < 0, -1, 1) for j in (1, 2))
-    first = hand * second * third
-    return order, jnp.stack([first, first * second, first * third])
+    return jnp.argmax(rank[None, :] == numbers[:, None], axis=1).astype(jnp.int32)
 
 
 def _axes_and_levels(torque_table):

@@ -36,8 +36,13 @@ KICKS = 10
 STEPS = 20.0
 """Most that a level of torque may be of the next: two decades and a half in two steps."""
 
-USUAL, COARSE = 0.3, 0.1
+USUAL, FEW = 0.3, 0.1
 """Shares of spacecraft with the paper's levels, and of those with fewer than three different."""
+
+COARSEST = np.deg2rad(0.025)
+"""Turn in a control period, at most, by the smallest impulse about the least moment, rad: a tenth
+of the paper's goal, which else could not be held.
+"""
 
 
 class Fleet(NamedTuple):
@@ -74,7 +79,9 @@ def draw(random: np.random.Generator, frameskips: np.ndarray) -> Fleet:
     share = _log_uniform(random, LIMIT, count)
     kick = impulse / np.min(moments, axis=1)
     limit = np.maximum.reduce([share * np.pi / duration, KICKS * kick, np.full(count, SLOWEST)])
-    levels = impulse[:, None] / INTEGRATION_STEP * _level_shares(random, count)
+    shares = _level_shares(random, count)
+    shares[:, -1] = np.minimum(shares[:, -1], COARSEST / (kick * period))
+    levels = impulse[:, None] / INTEGRATION_STEP * shares
     return Fleet(_tensors(random, moments), _tables(levels), limit)
 
 
@@ -110,8 +117,8 @@ def _level_shares(random, count):
     steps = _log_uniform(random, (1, STEPS), (count, 2))
     kind = random.random(count)
     steps[kind < USUAL] = 10
-    steps[kind > 1 - COARSE, 0] = 1
-    steps[kind > 1 - COARSE / 2, 1] = 1
+    steps[kind > 1 - FEW, 0] = 1
+    steps[kind > 1 - FEW / 2, 1] = 1
     return 1 / np.cumprod(np.column_stack([np.ones(count), steps]), axis=1)
 
 

@@ -64,7 +64,7 @@ def constant_bytes(flight: FlightPolicy) -> int:
 def stack_bytes(flight: FlightPolicy) -> int:
     """Bytes of the arrays that a decision has on the stack at once."""
     inputs, hidden = flight.layers[0].weights.shape[0], sum(flight.policy.hidden_sizes)
-    return 4 * (inputs + hidden + flight.kind.c(flight).stack)
+    return 4 * (inputs + hidden + 3 * _inputs(flight).turns + flight.kind.c(flight).stack)
 
 
 def operations(flight: FlightPolicy) -> dict[str, int]:
@@ -99,7 +99,7 @@ def _source_values(flight, decision, prefix):
         "features": flight.layers[0].weights.shape[0],
         "weights": "\n".join(_weights(n, x) for n, x in enumerate(flight.layers, 1)),
         "features_function": _fill(inputs.template, prefix, inputs.values),
-        "forward": _forward(flight.layers, decision.values["outputs"]),
+        "forward": _forward(flight.layers, decision.values["outputs"], inputs.turns),
     }
 
 
@@ -116,19 +116,22 @@ def _weights(number, layer):
     )
 
 
-def _forward(layers, outputs):
+def _forward(layers, outputs, turns):
     """The body of the function that fills in the outputs: one call for each layer."""
     hidden = range(1, len(layers))
     sizes = {n: layers[n - 1].weights.shape[1] for n in hidden}
     lines = ["float features[FEATURES];"]
     lines += [f"float hidden_{n}[{sizes[n]}];" for n in hidden]
-    lines += ["", "features_of(quaternion, angular_velocity, features);"]
+    lines += ["int backward[3];"] if turns else []
+    arguments = "quaternion, angular_velocity, features" + (", backward" if turns else "")
+    lines += ["", f"features_of({arguments});"]
     x = "features"
     for n, (rows, columns) in enumerate((x.weights.shape for x in layers), 1):
         y = f"hidden_{n}" if n in sizes else outputs
         lines += [f"layer({rows}, {columns}, weights_{n}, biases_{n}, {x}, {y});"]
         lines += [f"rectify({columns}, {y});"] if n in sizes else []
         x = y
+    lines += [f"turn_back(backward, {outputs});"] if turns else []
     return "\n".join("    " + line if line else "" for line in lines)
 
 

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from attjax.control import features
-from attjax.control.features import Multiscale, Universal
+from attjax.control import features, own_units, universal
+from attjax.control.features import Multiscale
+from attjax.control.universal import Universal
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs.context import Context
 from attjax.export import c_text
@@ -26,6 +27,8 @@ class CInputs(NamedTuple):
         values: what fills it in.
         constants: how many numbers its arrays have.
         tanh, other: how many operations of a decision it takes.
+        turns: whether it calls forward about each axis what the state says, and turns the
+            decision back.
     """
 
     template: str
@@ -33,6 +36,7 @@ class CInputs(NamedTuple):
     constants: int
     tanh: int
     other: int
+    turns: bool = False
 
 
 class Form(NamedTuple):
@@ -41,10 +45,12 @@ class Form(NamedTuple):
     Attributes:
         c: (context) to CInputs.
         onnx: (graph, context) to the name of the features among the graph's nodes.
+        onnx_outputs: (graph, name of the network's outputs) to that of what they mean.
     """
 
     c: Callable[[Context], CInputs]
     onnx: Callable[..., str]
+    onnx_outputs: Callable[..., str] = lambda graph, outputs: outputs
 
 
 def _state_in_c(context):
@@ -118,16 +124,24 @@ def _multiscale_in_onnx(graph, context):
 def _universal_in_c(context):
     numbers = Universal.of(context)
     arrays = {name: np.ravel(x) for name, x in numbers._asdict().items()}
-    arrays["scale_values"] = np.array(features.OWN_SCALES)
-    arrays["slew_scale_values"] = np.array(features.SLEW_SCALES)
+    arrays["scale_values"] = np.array(universal.OWN_SCALES)
+    arrays["slew_scale_values"] = np.array(universal.SLEW_SCALES)
     values = {name: c_text.table(x) for name, x in arrays.items()}
     counts = {"scales": "scale_values", "slew_scales": "slew_scale_values"}
     counts |= {"constant_count": "constants"}
     values |= {name: str(arrays[of].size) for name, of in counts.items()}
+    values |= {"levels": str(own_units.LEVELS), "pairs": _pairs_in_c()}
+    values |= {"first_product": str(universal.PRODUCTS[0]), "hand": str(universal.HAND)}
     constants, tanh = sum(x.size for x in arrays.values()), numbers.factors.shape[1]
     products = 6 * 9 + 3 * 4  # five products of a matrix, a sum of two, and roots
-    other = tanh + 6 * len(features.SLEW_SCALES) + products
-    return CInputs("features_universal.c", values, constants, tanh, other)
+    signs = 3 * 4 + 3 * 2 + 3
+    other = tanh + 6 * len(universal.SLEW_SCALES) + products + signs
+    return CInputs("features_universal.c", values, constants, tanh, other, turns=True)
+
+
+def _pairs_in_c():
+    pairs = zip(*universal.PAIRS)
+    return "{" + ", ".join(f"{{{a}, {b}}}" for a, b in pairs) + "}"
 
 
 def _universal_in_onnx(graph, context):
@@ -143,29 +157,65 @@ def _universal_in_onnx(graph, context):
         product("vector_part", "quaternion", numbers.of_vector),
         product("rate_part", "angular_velocity", numbers.of_rate),
     )
-    turn, one = graph.add("Add", [*parts], "turn"), graph.constant("one", np.ones(1))
-    larger = graph.add("Add", [graph.add("Abs", [turn], "size"), one], "larger")
+    turn, sign = _signs(graph, graph.add("Add", [*parts], "turn"))
+    larger = graph.add("Add", [turn, graph.constant("one", np.ones(1))], "larger")
     shortened = graph.add("Div", [turn, graph.add("Sqrt", [larger], "root")], "shortened")
-    momentum = product("own_momentum", "angular_velocity", numbers.momentum)
-    own = graph.add("Concat", [shortened, momentum], "own", axis=1)
+    own = product("own_momentum", "angular_velocity", numbers.momentum)
+    own = graph.add("Mul", [own, sign], "momentum")
+    own = graph.add("Concat", [shortened, own], "own", axis=1)
     lengths = graph.constant("lengths", np.tile(np.asarray(numbers.lengths), 2))
     over_length = graph.add("Div", [own, lengths], "over_length")
     own = graph.add("Concat", [own, over_length], "both", axis=1)
     factors = graph.constant("scale_factors", numbers.factors)
     fine = graph.add("Tanh", [graph.add("MatMul", [own, factors], "scaled")], "fine")
-    vector = product("vector", "quaternion", numbers.directions)
-    rate = product("rate", "angular_velocity", numbers.slowness)
-    nothing = graph.constant("nothing", np.zeros((4, numbers.constants.size)))
+    vector = product("vector_along", "quaternion", numbers.directions)
+    vector = graph.add("Mul", [vector, sign], "vector")
+    rate = product("rate_along", "angular_velocity", numbers.slowness)
+    rate = graph.add("Mul", [rate, sign], "rate")
     told = graph.constant("told", np.asarray(numbers.constants))
-    constants = graph.add("Gemm", ["quaternion", nothing, told], "constants")
+    constants = graph.add("Mul", [_signs_of_constants(graph, sign), told], "constants")
     last = graph.constant("last", np.eye(4)[:, 3:])
     scalar = graph.add("MatMul", ["quaternion", last], "scalar")
     return graph.add("Concat", [fine, vector, scalar, rate, constants], "features", axis=1)
 
 
+def _signs(graph, turn):
+    """Names of the turn's size and sign; the node "backward" is where it is negative."""
+    zero = graph.constant("no_turn", np.zeros(1))
+    down, up = graph.constant("down", -np.ones(1)), graph.constant("up", np.ones(1))
+    backward = graph.add("Less", [turn, zero], "backward")
+    return graph.add("Abs", [turn], "turn_size"), graph.add("Where", [backward, down, up], "sign")
+
+
+def _signs_of_constants(graph, sign):
+    """As universal.signs_of_constants."""
+    first, second = (
+        graph.add("Gather", [sign, graph.constant(f"{name}_axes", axes)], name, axis=1)
+        for name, axes in zip(("first", "second"), universal.PAIRS)
+    )
+    products = graph.add("Mul", [first, second], "sign_products")
+    hand = graph.add("ReduceProd", [sign], "sign_of_hand", axes=[1], keepdims=1)
+    signs = graph.add("Concat", [products, hand], "signs", axis=1)
+    places = np.array([*universal.PRODUCTS, universal.HAND])
+    placed = np.eye(universal.CONSTANTS)[places]
+    unsigned = graph.constant("unsigned", 1 - placed.sum(axis=0))
+    signs = graph.add("MatMul", [signs, graph.constant("places", placed)], "placed")
+    return graph.add("Add", [signs, unsigned], "signs_of_constants")
+
+
+def _turned_back_in_onnx(graph, outputs):
+    """As own_units.turned_back."""
+    numbers = np.arange(own_units.ACTIONS)
+    axis = graph.constant("axis_of_action", (numbers - 1) // 2 % own_units.AXES)
+    opposite = graph.constant("opposite_action", np.where(numbers == 0, 0, (numbers - 1 ^ 1) + 1))
+    is_turned = graph.add("Gather", ["backward", axis], "is_turned", axis=1)
+    opposite = graph.add("Gather", [outputs, opposite], "opposite", axis=1)
+    return graph.add("Where", [is_turned, opposite, outputs], "turned_back")
+
+
 FORMS: dict[str | Callable, Form] = {
     "state": Form(_state_in_c, _state_in_onnx),
     "multiscale": Form(_multiscale_in_c, _multiscale_in_onnx),
-    "universal": Form(_universal_in_c, _universal_in_onnx),
+    "universal": Form(_universal_in_c, _universal_in_onnx, _turned_back_in_onnx),
 }
 """By name; a policy with other inputs is exported as StableHLO alone, which JAX writes."""

@@ -58,8 +58,9 @@ def files(flight: FlightPolicy, seed: int = 0, prefix: str = c_names.PREFIX) -> 
 def model(flight: FlightPolicy) -> onnx.ModelProto:
     """The policy as an ONNX model, checked."""
     graph = Graph()
-    features = FORMS[flight.policy.features].onnx(graph, flight.context)
-    flight.kind.onnx(graph, flight, _network(graph, flight.layers, features))
+    form = FORMS[flight.policy.features]
+    outputs = _network(graph, flight.layers, form.onnx(graph, flight.context))
+    flight.kind.onnx(graph, flight, form.onnx_outputs(graph, outputs))
     inputs = [_tensor("quaternion", 4), _tensor("angular_velocity", 3)]
     result = helper.make_model(
         helper.make_graph(

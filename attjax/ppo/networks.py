@@ -11,6 +11,7 @@ from flax import struct
 
 from attjax.control import assurance, own_units
 from attjax.control.features import FEATURES
+from attjax.control.universal import backward_axes
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
 from attjax.ppo.distributions import Categorical, Gaussian
@@ -25,10 +26,13 @@ class Inputs:
     Attributes:
         features: (features,) network input.
         allowed: (actions,) bool, the actions that are not masked; None of continuous ones.
+        backward: (3,) bool, of :func:`attjax.control.features.backward_axes`; None of other
+            features.
     """
 
     features: chex.Array
     allowed: chex.Array | None
+    backward: chex.Array | None = None
 
 
 class Dense(nn.Module):
@@ -141,12 +145,13 @@ class Policy:
         features = function(observation, context)
         if self.actions == "continuous":
             return Inputs(features, None)
-        allowed = jnp.ones(self.num_actions, bool)
+        allowed, backward = jnp.ones(self.num_actions, bool), None
+        if self._is_universal:
+            backward, context = backward_axes(observation, context), own_units.ordered(context)
         if self.rate_margin > 0:
-            context = own_units.ordered(context) if self._is_universal else context
             angular_velocity = observation[observations.ANGULAR_VELOCITY]
             allowed = assurance.rate_mask(context, self.rate_margin).allowed(angular_velocity)
-        return Inputs(features, allowed)
+        return Inputs(features, allowed, backward)
 
     @property
     def _is_universal(self):
@@ -161,6 +166,8 @@ class Policy:
         outputs: chex.Array = self.policy_network.apply(params["policy"], inputs.features)
         if inputs.allowed is None:
             return outputs
+        if inputs.backward is not None:
+            outputs = own_units.turned_back(outputs, inputs.backward)
         return jnp.where(inputs.allowed.T, outputs, MASKED_LOGIT)
 
     def distribution(self, params: dict, inputs: Inputs) -> Categorical | Gaussian:

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from attjax import LM50, AttitudeEnv, EnvState, Spacecraft, step
-from attjax.control import features, own_units
+from attjax.control import own_units, universal
 from attjax.control.own_units import OwnUnits
 from attjax.envs import observation
 from attjax.export.flight_policy import FlightPolicy
@@ -62,7 +62,7 @@ def test_near_the_goal_every_spacecraft_is_the_same(x64, craft, frameskip):
     """z grows by the momentum after the action, be it a pulse or held, at every rate."""
     env = AttitudeEnv(frameskip, spacecraft=craft)
     params = env.default_params
-    numbers = features.Universal.of(env.context(params))
+    numbers = universal.Universal.of(env.context(params))
 
     def own(state):
         z = numbers.of_vector @ state.quaternion[:3] + numbers.of_rate @ state.angular_velocity
@@ -89,10 +89,7 @@ def renamed(craft):
 
 @KINDS
 def test_names_of_axes_change_nothing(craft):
-    """Inputs and the torque decided on are the same to the last bit but for -0.
-
-    A body in its principal axes has no products of inertia to tell a half turn of it by.
-    """
+    """Inputs and the torque decided on are the same to the last bit but for -0."""
     policy = Policy("universal", (8,), own_units.ACTIONS, 0.99)
     state = observation.observe(jnp.array([0.3, -0.2, 0.4, 0.84]), jnp.array([0.02, -0.03, 0.01]))
     params = policy.init(jax.random.key(1), jax.random.key(2), state, context_of(craft))
@@ -100,20 +97,59 @@ def test_names_of_axes_change_nothing(craft):
     seen, torques = [], []
     for same in renamed(craft):
         context = context_of(same)
-        seen.append(features.universal_features(state, context))
+        seen.append(universal.universal_features(state, context))
         torques.append(context.torque_table[policy.act(params, state, context)])
-    most = 4 if craft is LM50 else 1
-    assert len(np.unique(np.array(seen) + 0.0, axis=0)) == most
-    assert len(np.unique(np.array(torques) + 0.0, axis=0)) <= most and np.any(torques[0])
+    assert len(np.unique(np.array(seen) + 0.0, axis=0)) == 1
+    assert len(np.unique(np.array(torques) + 0.0, axis=0)) == 1 and np.any(torques[0])
 
 
-def test_axes_are_in_order_and_right_handed(x64):
+@pytest.mark.parametrize("axis", range(3))
+def test_a_half_turn_of_a_body_in_its_principal_axes_turns_the_decision(x64, axis):
+    """Gyroscopic torques among them: what is seen is the same, and what is decided is turned."""
+    context = context_of(LM50)
+    policy = Policy("universal", (8,), own_units.ACTIONS, 0.99)
+    turn = -np.ones(3)
+    turn[axis] = 1
+    vector, rate = jnp.array([0.3, -0.2, 0.4]), jnp.array([0.02, -0.03, 0.01])
+    state, turned = (
+        observation.observe(jnp.append(s * vector, 0.84), s * rate) for s in (np.ones(3), turn)
+    )
+    params = policy.init(jax.random.key(1), jax.random.key(2), state, context)
+    params["policy"]["params"]["Dense_1"]["kernel"] *= 100
+    seen, same = (universal.universal_features(x, context) for x in (state, turned))
+    np.testing.assert_array_equal(seen + 0.0, same + 0.0)
+    torque, other = (context.torque_table[policy.act(params, x, context)] for x in (state, turned))
+    assert np.any(torque)
+    np.testing.assert_array_equal(turn * torque + 0.0, other + 0.0)
+
+
+@pytest.mark.parametrize("signs", list(itertools.product((1, -1), repeat=3)))
+def test_an_action_turned_back_is_the_one_that_was_meant(signs):
+    """The best of the network's outputs acts forward; about axes called backward it acts back."""
+    context = own_units.ordered(context_of(SKEW))
+    backward = np.array([signs]) < 0
+    for action in range(own_units.ACTIONS):
+        outputs = np.arange(own_units.ACTIONS) == action
+        place = np.argmax(own_units.turned_back(jnp.asarray(outputs[:, None]), backward)[:, 0])
+        units = OwnUnits.of(context)
+        meant, done = (
+            units.momentum @ np.linalg.solve(_tensor(context), context.torque_table[n])
+            for n in (action, place)
+        )
+        np.testing.assert_allclose(done, np.array(signs) * meant, rtol=1e-5, atol=1e-4)
+
+
+def _tensor(context):
+    return np.asarray(context.inertia)
+
+
+def test_axes_are_in_order(x64):
     for craft in (LM50, PULSES, SKEW, *list(renamed(PULSES))[:8]):
         context = own_units.ordered(context_of(craft))
         units = OwnUnits.of(context)
         shape = np.asarray(units.shape)
         assert np.all(np.diff(np.diagonal(shape)) > 0)
-        assert np.linalg.det(units.directions) > 0 and min(shape[0, 1:]) >= 0
+        assert units.hand == np.sign(np.linalg.det(units.directions))
         np.testing.assert_array_equal(own_units.rows(context), np.arange(own_units.ACTIONS))
 
 
@@ -152,29 +188,34 @@ def test_spacecraft_without_three_axes_are_refused(as_users_run):
     own_units.check_axes(SKEW)
 
 
+@pytest.mark.parametrize("way", [1, -1])
 @KINDS
-def test_universal_features_written_out(x64, craft):
+def test_universal_features_written_out(x64, craft, way):
     context = own_units.ordered(context_of(craft, 11))
     units, h, d = OwnUnits.of(context), 0.05, float(context.torque_duration)
-    q, w = np.array([0.3, -2e-3, 4e-6, 0.9]), np.array([0.2, -1e-4, 3e-7])
+    q, w = np.array([0.3 * way, -0.25 * way, 4e-6, 0.9]), np.array([0.2, -1e-4, 3e-7])
     p, axes, shape = (np.asarray(x) for x in (units.momentum, units.directions, units.shape))
     z = p @ (2 * q[:3]) / h + p @ w * d / (2 * h)
-    x = np.concatenate([z / np.sqrt(1 + abs(z)), p @ w])
+    sign = np.where(z < 0, -1, 1)
+    assert way == 1 or np.any(sign < 0)
+    x = np.concatenate([abs(z) / np.sqrt(1 + abs(z)), sign * (p @ w)])
     moments = np.diagonal(shape)
     slew = x / np.tile(np.sqrt(moments / h), 2)
     expected = [np.tanh(4.0**n * component) for n in range(-5, 4) for component in x]
     expected += [np.tanh(k * component) for k in (0.5, 1, 2, 4) for component in slew]
-    expected += [*axes @ q[:3], q[3], *axes @ w / craft.rate_limit]
+    expected += [*sign * (axes @ q[:3]), q[3], *sign * (axes @ w) / craft.rate_limit]
     expected += [*(np.log(moments / h) / 2 - 3)]
     expected += [
-        shape[i, j] / np.sqrt(moments[i] * moments[j]) for i, j in ((0, 1), (0, 2), (1, 2))
+        sign[i] * sign[j] * shape[i, j] / np.sqrt(moments[i] * moments[j])
+        for i, j in ((0, 1), (0, 2), (1, 2))
     ]
     expected += [*(np.log(craft.rate_limit * moments) / 2 - 2.25)]
     levels = np.array(craft.torque_levels)
     expected += [*(np.log(levels[1:] / levels[0]) / 4 + 0.5), d / h, np.log(10 * h)]
+    expected += [np.prod(sign) * np.linalg.det(axes) / abs(np.linalg.det(axes))]
     observed = jnp.concatenate([q, np.full(4, 7.0), w])  # q̇ is not looked at
-    found = features.universal_features(observed, context_of(craft, 11))
-    assert found.shape == (98,)
+    found = universal.universal_features(observed, context_of(craft, 11))
+    assert found.shape == (99,)
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
 

@@ -51,14 +51,19 @@ def test_slews_levels_and_limits_are_as_said():
     low, high = fleet.QUARTER_TURN
     assert low * (1 - 1e-9) <= periods.min() < 1.05 * low and periods.max() <= high * (1 + 1e-9)
     assert duration.max() == pytest.approx(fleet.LONGEST)
-    shares = levels / levels[:, :1]
-    assert np.all(np.diff(shares, axis=1) <= 0) and shares.min() > 1 / (1.001 * fleet.STEPS**2)
-    usual = np.isclose(shares[:, 1], 0.1) & np.isclose(shares[:, 2], 0.01)
-    assert np.mean(usual) == pytest.approx(fleet.USUAL, abs=0.03)
-    coarse = np.isclose(shares[:, 1], 1)
-    assert np.mean(coarse) == pytest.approx(fleet.COARSE, abs=0.02)
-    assert np.mean(np.isclose(shares[:, 2], 1)) == pytest.approx(fleet.COARSE / 2, abs=0.015)
     kick = levels[:, 0] * INTEGRATION_STEP / moments[:, 0]
+    shares = levels / levels[:, :1]
+    finest = shares[:, 2] * kick * period
+    assert finest.max() == pytest.approx(fleet.COARSEST)
+    free = finest < fleet.COARSEST * (1 - 1e-9)
+    assert 0.7 < np.mean(free) < 0.95
+    assert np.all(np.diff(shares, axis=1) <= 0)
+    assert shares[free].min() > 1 / (1.001 * fleet.STEPS**2)
+    usual = np.isclose(shares[:, 1], 0.1) & (np.isclose(shares[:, 2], 0.01) | ~free)
+    assert np.mean(usual) == pytest.approx(fleet.USUAL, abs=0.03)
+    few = np.isclose(shares[:, 1], 1)
+    assert np.mean(few) == pytest.approx(fleet.FEW, abs=0.02)
+    assert np.mean(np.isclose(shares[:, 2], 1)) < 0.75 * fleet.FEW / 2
     assert np.all(spacecraft.rate_limit >= fleet.KICKS * kick * (1 - 1e-9))
     assert np.all(spacecraft.rate_limit >= fleet.SLOWEST)
     share = spacecraft.rate_limit * duration / np.pi
