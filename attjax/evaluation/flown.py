@@ -57,11 +57,16 @@ def decide(
             memory, jax.vmap(measured)(of_loops), context
         )
         told = jnp.concatenate([observed, told[looped:]])
-    acting = [x.controller if isinstance(x, FlightLoop) else x for x in controllers]
-    actions = [
-        jax.vmap(act, (0, None))(told[n * each : (n + 1) * each], context)
-        for n, act in enumerate(acting)
-    ]
+    actions = []
+    for n, controller in enumerate(controllers):
+        part = slice(n * each, (n + 1) * each)
+        act, known, axis = controller, context, None
+        if isinstance(controller, FlightLoop):
+            act = controller.controller
+            if controller.adapts:
+                own = jax.tree.map(lambda x, part=part: x[part], memory)
+                known, axis = jax.vmap(controller.believed, (0, None))(own, context), 0
+        actions.append(jax.vmap(act, (0, axis))(told[part], known))
     action = jnp.concatenate(actions)
     if loops:
         memory = jax.vmap(loops[0].after, (0, 0, None))(memory, action[:looped], context)
