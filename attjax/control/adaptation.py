@@ -96,7 +96,7 @@ def _shares(identity):
 
 
 def _product(a, b):
-    return jnp.sum(a[:, :, None] * b, axis=1)
+    return jnp.matmul(a, b, precision="highest")
 
 
 def bodily(queue: Queue, identity: Identity, context: Context) -> Queue:

@@ -94,12 +94,12 @@ def corrected(
     ahead, offset = _ahead(identity, period, rows, kicks)
     innovation, variances = (jnp.stack(x) for x in list(zip(*told))[1:3])
     seen = Seen(innovation - offset, variances, told[0].is_told)
-    white, sizes = _whitened(_of_told(ahead, identity, seen), seen.residual[:, None])
-    surprise = seen.is_told * jnp.sum(white[:, 0] ** 2 / sizes)
+    surprise = jnp.sum(_whitened(ahead, identity, seen).surprise ** 2)
     change = jnp.where(surprise > SURPRISING, 1, 0).astype(kicks.dtype)
     ahead = _opened(identity, ahead, change)
-    strengths, doubts = _strengths(ahead, _of_told(ahead, identity, seen), seen)
-    spread, error, response = _updated(ahead, identity, seen)
+    white = _whitened(ahead, identity, seen)
+    strengths, doubts = _strengths(ahead, white)
+    spread, error, response = _updated(ahead, white, seen)
     rate = jnp.stack(period.after) + offset + error
     added = vectors.components(response[6:].reshape(len(kicks), 3))
     return identity.replace(
@@ -128,8 +128,7 @@ def _ahead(identity, period, rows, kicks):
 
 
 def _times(a, b):
-    """The product of two small matrices: under ``vmap`` faster than a batch of them."""
-    return jnp.sum(a[:, :, None] * b, axis=1)
+    return jnp.matmul(a, b, precision="highest")
 
 
 def _sizes(identity):
@@ -154,12 +153,6 @@ def _own(ahead, identity):
     most = jnp.sum(spread.cross**2) + jnp.trace(rate)
     more = ahead.turned * most + jnp.minimum(share, 1) * jnp.sum(swung**2)
     return rate + more * jnp.eye(3, dtype=rate.dtype)
-
-
-def _of_told(ahead, identity, seen):
-    """Covariance of what is told."""
-    cross = ahead.spread.cross
-    return _own(ahead, identity) + _times(cross, cross.T) + jnp.diag(seen.variances)
 
 
 def _opened(identity, ahead, change):
@@ -196,61 +189,88 @@ def _opened(identity, ahead, change):
     )
 
 
-def _whitened(matrix, columns):
-    """L⁻¹ times (3, n) columns, and D (3,), of a (3, 3) covariance L D Lᵀ."""
-    first = matrix[0, 0]
-    low, side = matrix[1, 0] / first, matrix[2, 0] / first
-    second = matrix[1, 1] - low * low * first
-    cross = (matrix[2, 1] - low * side * first) / second
-    third = matrix[2, 2] - side * side * first - cross * cross * second
-    y = columns[1] - low * columns[0]
-    z = columns[2] - side * columns[0] - cross * y
-    return jnp.stack([columns[0], y, z]), jnp.stack([first, second, third])
+class White(NamedTuple):
+    """What is told, in numbers W z whose noise, with all that is not of the response, is white.
+
+    Attributes:
+        own: (3, 3) covariance of the rate's errors that are not of the response.
+        whitening: W.
+        cross: Φ, (3, errors), by the errors of the response.
+        inverse, half: L⁻¹ and (L + 1)⁻¹ of L Lᵀ = 1 + Φ Φᵀ.
+        surprise: L⁻¹ W z, (3,).
+    """
+
+    own: chex.Array
+    whitening: chex.Array
+    cross: chex.Array
+    inverse: chex.Array
+    half: chex.Array
+    surprise: chex.Array
 
 
-def _strengths(ahead, of_told, seen):
+def _whitened(ahead, identity, seen):
+    """What is told, nothing of it where there is nothing."""
+    own = _own(ahead, identity)
+    whitening, _ = _roots(own + jnp.diag(seen.variances))
+    whitening = seen.is_told * whitening
+    cross = _times(whitening, ahead.spread.cross)
+    inverse, half = _roots(_times(cross, cross.T) + jnp.eye(3, dtype=own.dtype))
+    residual = _times(inverse, _times(whitening, seen.residual))
+    return White(own, whitening, cross, inverse, half, residual)
+
+
+def _roots(matrix):
+    """L⁻¹ and (L + 1)⁻¹ of a positive (3, 3) matrix L Lᵀ, with L lower triangular."""
+    found = together(_of_root, tuple(matrix[i, j] for i, j in PAIRS))
+    return [jnp.stack([jnp.stack(row) for row in x]) for x in found]
+
+
+def _of_root(elements):
+    xx, xy, xz, yy, yz, zz = elements
+    first = jnp.sqrt(xx)
+    low, side = xy / first, xz / first
+    second = jnp.sqrt(yy - low * low)
+    across = (yz - low * side) / second
+    third = jnp.sqrt(zz - side * side - across * across)
+    zero = jnp.zeros_like(xx)
+    found = []
+    for more in (0, 1):
+        a, b, c = (1 / (x + more) for x in (first, second, third))
+        corner = a * c * (low * across * b - side)
+        found.append(((a, zero, zero), (-low * a * b, b, zero), (corner, -across * b * c, c)))
+    return found
+
+
+def _strengths(ahead, white):
     """Errors of the strengths, each by itself, and their variances, after the rate was told."""
-    known = jnp.concatenate([seen.residual[:, None], ahead.kicks.T], axis=1)
-    white, sizes = _whitened(of_told, known)
-    white = white * (seen.is_told / jnp.sqrt(sizes))[:, None]
-    kicks = white[:, 1:]
+    kicks = _times(white.inverse, _times(white.whitening, ahead.kicks.T))
     weights = ahead.variances * ahead.commands
     certain = weights * ahead.commands * jnp.sum(kicks**2, axis=0)
-    error = weights * jnp.sum(kicks * white[:, :1], axis=0)
+    error = weights * _times(kicks.T, white.surprise)
     return error, ahead.variances * jnp.maximum(1 - certain, 0)
 
 
-def _updated(ahead, identity, seen):
+def _updated(ahead, white, seen):
     """Spread, and errors of rate and response, after the rate was told.
 
-    With errors S x of the response and A x + c of the rate, where x is of unit covariance: x by
-    Potter's square root, of one whitened number after the other, and then c by what is left.
+    With errors S x of the response and A x + c of the rate, where x is of unit covariance: x by the
+    square root of Andrews (1968), and then c by what is left.
     """
-    own, root = _own(ahead, identity), ahead.spread.response
-    noise = own + jnp.diag(seen.variances)
-    eye = jnp.eye(3, dtype=own.dtype)
-    known = [ahead.spread.cross, seen.residual[:, None], own, eye]
-    white, sizes = _whitened(noise, jnp.concatenate(known, axis=1))
-    white = white / jnp.sqrt(sizes)[:, None]
-    count = len(root)
-    cross, residual = white[:, :count], white[:, count]
-    shares, lower = white[:, count + 1 : count + 4], white[:, count + 4 :]
-    response = jnp.zeros(count, root.dtype)
-    for n in AXES:
-        row = cross[n]
-        size = 1 + seen.is_told * jnp.sum(row**2)
-        of_root, of_cross = (jnp.sum(x * row, axis=1) for x in (root, cross))
-        step = seen.is_told * residual[n] / size
-        response, residual = response + step * of_root, residual - step * of_cross
-        factor = seen.is_told / (size + jnp.sqrt(size))
-        root = root - factor * of_root[:, None] * row
-        cross = cross - factor * of_cross[:, None] * row
-    back = seen.variances[:, None] * lower.T  # R Wᵀ, with W of the whitening
-    rate = _times(back, shares)
-    told = Spread((rate + rate.T) / 2, _times(back, cross), root)
-    spread = vectors.chosen(seen.is_told > 0, told, ahead.spread._replace(rate=own))
-    error = seen.is_told * (seen.residual - jnp.sum(back * residual, axis=1))
-    return spread, error, response
+    root, cross = ahead.spread.response, white.cross
+    left = _times(white.inverse.T, white.surprise)
+    seen_by = _times(root, cross.T)
+    shrunk = _times(white.inverse.T, white.half)
+    back = seen.variances[:, None] * white.whitening.T
+    rate = _times(back, _times(white.whitening, white.own))
+    kept = white.half + shrunk
+    told = Spread(
+        rate=(rate + rate.T) / 2,
+        cross=_times(_times(back, kept), cross),
+        response=root - _times(_times(seen_by, shrunk), cross),
+    )
+    spread = vectors.chosen(seen.is_told > 0, told, ahead.spread._replace(rate=white.own))
+    error = seen.is_told * (seen.residual - _times(back, left))
+    return spread, error, _times(seen_by, left)
 
 
 def _stepped(mobility, step):
