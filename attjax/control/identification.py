@@ -31,6 +31,9 @@ SURPRISING = 35.4
 SHARE_OF_CHANGE = 1.0
 """Standard deviation of a sudden change, as a share: what dies loses all of it, and no more."""
 
+SHARE_OF_EACH = 0.1
+"""The same of each number by itself: ±10 % is what projects assume of an inertia."""
+
 MOST_STEP = 0.5
 """A correction of N leaves at least this share of it along every axis, so it stays positive."""
 
@@ -159,8 +162,8 @@ def _opened(identity, ahead, change):
     """The same after a sudden change, where there was one.
 
     If something was commanded in the period, all may have changed in proportion, as by a mass that
-    came or went, or the strength of what was commanded. If not, the moments have. What was known of
-    how errors go together is lost.
+    came or went, or the strength of what was commanded. If not, the moments have. Each number may
+    be somewhat off besides, and what was known of how errors go together is lost.
     """
     spread, axes = ahead.spread, len(ahead.kicks)
     is_on = jnp.where(ahead.commands != 0, change, 0)
@@ -170,9 +173,9 @@ def _opened(identity, ahead, change):
     lengths = jnp.repeat(jnp.sqrt(jnp.sum(columns**2, axis=1)), 3)
     sizes = _sizes(identity)
     alone = jnp.append((change - most) * sizes, jnp.zeros(3 * axes, sizes.dtype))
-    least = RESOLVED * jnp.append(sizes, lengths)
+    each = SHARE_OF_EACH * jnp.append(sizes, lengths)
     deviations = jnp.sum(spread.response**2, axis=1)
-    deviations = jnp.sqrt(deviations + (SHARE_OF_CHANGE * alone) ** 2 + least**2)
+    deviations = jnp.sqrt(deviations + (SHARE_OF_CHANGE * alone) ** 2 + each**2)
     whole = SHARE_OF_CHANGE * most * response
     shares = whole / jnp.maximum(deviations, LEAST)
     square = jnp.sum(shares**2)

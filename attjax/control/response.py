@@ -108,12 +108,16 @@ def unknowing(context: Context) -> Identity:
     turned = [jnp.stack([jnp.cross(axis, row) for row in mobility.T]).T for axis in eye]
     errors = [(wrong.inertia, mobility), *((wrong.moments, x) for x in parts)]
     errors += [(wrong.turned, x + x.T) for x in turned]
+    most = 1 / jnp.min(moments) - 1 / jnp.max(moments)  # by which turning changes N at most
+    squared = 2**0.5 * wrong.turned**2 * most
+    errors += [(squared / 2, _both(axes.T[i], axes.T[j])) for i, j in PAIRS]
     roots = [share * _vector(x, directions @ x) for share, x in errors]
     for number, direction in enumerate(directions):
         far = eye[jnp.argmin(jnp.abs(direction))]
         first = jnp.cross(direction, far) / jnp.linalg.norm(jnp.cross(direction, far))
         across = first, jnp.cross(direction, first)
-        for share, way in ((wrong.gain, direction), *((wrong.tilt, x) for x in across)):
+        gain = jnp.hypot(wrong.gain, wrong.tilt**2)  # what is turned away is less along
+        for share, way in ((gain, direction), *((wrong.tilt, x) for x in across)):
             column = jnp.zeros((count, 3), dtype).at[number].set(mobility @ way)
             roots.append(share * _vector(jnp.zeros((3, 3), dtype), column))
     root, valves = jnp.stack(roots, axis=1), valves_of(context)
@@ -130,6 +134,10 @@ def unknowing(context: Context) -> Identity:
             response=_square_root(root),
         ),
     )
+
+
+def _both(a, b):
+    return jnp.outer(a, b) + jnp.outer(b, a)
 
 
 def _square_root(matrix):
