@@ -1,5 +1,6 @@
-"""What a flight loop believes once it identifies the spacecraft: its context, decision by decision."""
+"""What a flight loop believes of a spacecraft that it identifies, decision by decision."""
 
+import dataclasses
 from typing import Any
 
 import chex
@@ -7,9 +8,9 @@ import jax.numpy as jnp
 
 from attjax.control import belief, covariance, identification, linearized, measured, response
 from attjax.control.covariance import product
-from attjax.control.response import Identity, Period
 from attjax.control.linearized import AXES
-from attjax.dynamics import vectors
+from attjax.control.response import Identity, Period
+from attjax.dynamics import rigid_body, vectors
 from attjax.dynamics.actuators import Queue
 from attjax.envs.context import Context
 from attjax.envs.torques import applied_torque
@@ -24,7 +25,7 @@ def filtering(context: Context) -> Context:
     known = context.knowledge
     if known.wheels is not None:
         raise ValueError("a flight loop cannot adapt to reaction wheels yet")
-    return context.replace(knowledge=known.replace(is_filtered=True))
+    return dataclasses.replace(context, knowledge=known.replace(is_filtered=True))
 
 
 def commanded(action: chex.Numeric, context: Context) -> chex.Array:
@@ -55,6 +56,9 @@ def torques(identity: Identity, context: Context) -> chex.Array:
 def believed(context: Context, identity: Identity, queue: Queue) -> Context:
     """The context with what has been identified in place of what was believed before.
 
+    Of real actions, which are fractions of torques about the body's axes, it is what these give
+    about their own.
+
     Args:
         context: as believed before the flight.
         identity: of the spacecraft.
@@ -66,14 +70,14 @@ def believed(context: Context, identity: Identity, queue: Queue) -> Context:
     weak = jnp.sum(jnp.where(is_on, jnp.stack(identity.variances), 0))
     known = known.replace(along=jnp.sqrt(along + weak), across=across, inertia=inertia)
     if context.continuous:
-        rows = context.torque_table  # TODO
+        rows = context.torque_table * jnp.diag(table)
     else:
         sizes = jnp.linalg.norm(context.torque_table[1:], axis=1)
         sign = jnp.tile(jnp.array([1, -1], sizes.dtype), len(table))
         rows = jnp.repeat(table, 2, axis=0) * (sign * sizes)[:, None]
         rows = jnp.concatenate([jnp.zeros_like(rows[:1]), rows])
     tensor = jnp.stack([jnp.stack(row) for row in identity.inertia])
-    return context.replace(inertia=tensor, torque_table=rows, knowledge=known)
+    return dataclasses.replace(context, inertia=tensor, torque_table=rows, knowledge=known)
 
 
 def _shares(identity):
@@ -104,6 +108,26 @@ def bodily(queue: Queue, identity: Identity, context: Context) -> Queue:
     table = torques(identity, context)
     found = jnp.sum(queue.torques[:, :, None] * table, axis=1)
     return Queue(queue.starts, found)
+
+
+def leaned(rate: chex.Array, torque: Any, context: Context) -> chex.Array:
+    """The rate (3,) that a controller must be shown to hold against a constant torque d.
+
+    It takes out what it is shown by impulses at once, and so holds a target where it is shown 0 on
+    average. A torque of the duration τ that undoes d in each period T leaves the attitude where it
+    is if the rate is N d T (½ − τ/2T) when it begins; shown N d T, it asks for that torque.
+
+    Args:
+        rate: as estimated, rad/s.
+        torque: d, three components, N m; None: there is none.
+        context: as believed.
+    """
+    if torque is None:
+        return rate
+    share = (1 + context.torque_duration / context.control_period) / 2
+    turning = rigid_body.inverse(context.inertia)
+    pushed = jnp.matmul(turning, jnp.stack(torque), precision="highest")
+    return rate + share * context.control_period * pushed
 
 
 def begun(identity: Identity, estimate: Any) -> Identity:
@@ -151,7 +175,7 @@ def identified(
 
 
 def _least_change(model, context):
-    """What no command makes a difference of, rad/s: RESOLVED of the weakest pulse's least effect."""
+    """RESOLVED of the least that a command changes the rate by, rad/s."""
     sizes = jnp.linalg.norm(context.torque_table, axis=1)
     weakest = jnp.min(jnp.where(sizes > 0, sizes, jnp.inf))
     least = jnp.min(jnp.stack([row[i] for i, row in enumerate(model.inverse)]))

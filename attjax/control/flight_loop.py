@@ -115,6 +115,8 @@ class FlightLoop(struct.PyTreeNode):
             if context.knowledge.delay:
                 state = belief.after_delay(state, _bodily(memory, context), context)
         quaternion, rate = jnp.stack(state.quaternion), jnp.stack(state.angular_velocity)
+        if memory is not None and self.adapts:
+            rate = adaptation.leaned(rate, memory.estimate.torque, context)
         rules = context.kinematic_factor, context.observes_quaternion_rate
         return observations.observe(quaternion, rate, *rules), memory
 

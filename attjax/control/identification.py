@@ -6,22 +6,22 @@ changed, and is then open to doubt again. So nothing is learned of what is not m
 forgotten. Matrices are arrays of a fixed size; no control flow depends on data.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import chex
 import jax.numpy as jnp
 
+from attjax.control import square_root
 from attjax.control.covariance import Scalar
 from attjax.control.linearized import AXES, Model
 from attjax.control.response import (
-    PAIRS,
     Identity,
     Period,
-    Spread,
     inverted,
     sensitivities,
     symmetric,
 )
+from attjax.control.square_root import PAIRS, Seen, Spread, times
 from attjax.dynamics import vectors
 from attjax.dynamics.fused_loop import together
 
@@ -42,20 +42,6 @@ RESOLVED = 1e-3
 
 LEAST = 1e-30
 """Nothing is divided by zero."""
-
-
-class Seen(NamedTuple):
-    """Of three rates that are told.
-
-    Attributes:
-        residual: (3,) told, less what was expected.
-        variances: (3,) of their noise.
-        is_told: 1, or 0 where there are none.
-    """
-
-    residual: chex.Array
-    variances: chex.Array
-    is_told: chex.Array
 
 
 class Ahead(NamedTuple):
@@ -97,12 +83,14 @@ def corrected(
     ahead, offset = _ahead(identity, period, rows, kicks)
     innovation, variances = (jnp.stack(x) for x in list(zip(*told))[1:3])
     seen = Seen(innovation - offset, variances, told[0].is_told)
-    surprise = jnp.sum(_whitened(ahead, identity, seen).surprise ** 2)
+    surprise = jnp.sum(
+        square_root.whitened(_own(ahead, identity), ahead.spread, seen).surprise ** 2
+    )
     change = jnp.where(surprise > SURPRISING, 1, 0).astype(kicks.dtype)
     ahead = _opened(identity, ahead, change)
-    white = _whitened(ahead, identity, seen)
+    white = square_root.whitened(_own(ahead, identity), ahead.spread, seen)
     strengths, doubts = _strengths(ahead, white)
-    spread, error, response = _updated(ahead, white, seen)
+    spread, error, response = square_root.updated(ahead.spread, white, seen)
     rate = jnp.stack(period.after) + offset + error
     added = vectors.components(response[6:].reshape(len(kicks), 3))
     return identity.replace(
@@ -121,17 +109,13 @@ def _ahead(identity, period, rows, kicks):
     offset = jnp.sum(own * (jnp.stack(identity.rate) - jnp.stack(period.before)), axis=1)
     given = jnp.stack(period.impulses).reshape(-1, len(kicks))
     spread = before._replace(
-        cross=_times(own, before.cross) + _times(by_response, before.response),
-        rate=_times(_times(own, before.rate), own.T) + jnp.diag(jnp.stack(period.unexplained)),
+        cross=times(own, before.cross) + times(by_response, before.response),
+        rate=times(times(own, before.rate), own.T) + jnp.diag(jnp.stack(period.unexplained)),
     )
     eye = jnp.eye(3, dtype=own.dtype)
     turned = jnp.sum((own - eye) ** 2) + float(jnp.finfo(own.dtype).eps) ** 0.5
     doubts = jnp.stack(identity.variances).reshape(given.shape)
     return Ahead(spread, by_response, kicks, given, doubts, turned), offset
-
-
-def _times(a, b):
-    return jnp.matmul(a, b, precision="highest")
 
 
 def _sizes(identity):
@@ -150,8 +134,8 @@ def _own(ahead, identity):
     """
     spread = ahead.spread
     shares = jnp.sum(ahead.commands**2 * ahead.variances, axis=0)
-    rate = spread.rate + _times(ahead.kicks.T * shares, ahead.kicks)
-    swung = _times(ahead.by_response[:, :6], spread.response[:6])
+    rate = spread.rate + times(ahead.kicks.T * shares, ahead.kicks)
+    swung = times(ahead.by_response[:, :6], spread.response[:6])
     share = jnp.max(jnp.sum(spread.response[:6] ** 2, axis=1) / _sizes(identity) ** 2)
     most = jnp.sum(spread.cross**2) + jnp.trace(rate)
     more = ahead.turned * most + jnp.minimum(share, 1) * jnp.sum(swung**2)
@@ -182,8 +166,8 @@ def _opened(identity, ahead, change):
     share = 1 / (1 + jnp.sqrt(1 + square))  # (√(1 + u²) − 1)/u², of the root of D² + w wᵀ
     root = jnp.diag(deviations) + share * whole[:, None] * shares
     opened = Spread(
-        rate=spread.rate + _times(spread.cross, spread.cross.T),
-        cross=_times(ahead.by_response, root),
+        rate=spread.rate + times(spread.cross, spread.cross.T),
+        cross=times(ahead.by_response, root),
         response=root,
     )
     return ahead._replace(
@@ -192,88 +176,13 @@ def _opened(identity, ahead, change):
     )
 
 
-class White(NamedTuple):
-    """What is told, in numbers W z whose noise, with all that is not of the response, is white.
-
-    Attributes:
-        own: (3, 3) covariance of the rate's errors that are not of the response.
-        whitening: W.
-        cross: Φ, (3, errors), by the errors of the response.
-        inverse, half: L⁻¹ and (L + 1)⁻¹ of L Lᵀ = 1 + Φ Φᵀ.
-        surprise: L⁻¹ W z, (3,).
-    """
-
-    own: chex.Array
-    whitening: chex.Array
-    cross: chex.Array
-    inverse: chex.Array
-    half: chex.Array
-    surprise: chex.Array
-
-
-def _whitened(ahead, identity, seen):
-    """What is told, nothing of it where there is nothing."""
-    own = _own(ahead, identity)
-    whitening, _ = _roots(own + jnp.diag(seen.variances))
-    whitening = seen.is_told * whitening
-    cross = _times(whitening, ahead.spread.cross)
-    inverse, half = _roots(_times(cross, cross.T) + jnp.eye(3, dtype=own.dtype))
-    residual = _times(inverse, _times(whitening, seen.residual))
-    return White(own, whitening, cross, inverse, half, residual)
-
-
-def _roots(matrix):
-    """L⁻¹ and (L + 1)⁻¹ of a positive (3, 3) matrix L Lᵀ, with L lower triangular."""
-    found = together(_of_root, tuple(matrix[i, j] for i, j in PAIRS))
-    return [jnp.stack([jnp.stack(row) for row in x]) for x in found]
-
-
-def _of_root(elements):
-    xx, xy, xz, yy, yz, zz = elements
-    first = jnp.sqrt(xx)
-    low, side = xy / first, xz / first
-    second = jnp.sqrt(yy - low * low)
-    across = (yz - low * side) / second
-    third = jnp.sqrt(zz - side * side - across * across)
-    zero = jnp.zeros_like(xx)
-    found = []
-    for more in (0, 1):
-        a, b, c = (1 / (x + more) for x in (first, second, third))
-        corner = a * c * (low * across * b - side)
-        found.append(((a, zero, zero), (-low * a * b, b, zero), (corner, -across * b * c, c)))
-    return found
-
-
 def _strengths(ahead, white):
     """Errors of the strengths, each by itself, and their variances, after the rate was told."""
-    kicks = _times(white.inverse, _times(white.whitening, ahead.kicks.T))
+    kicks = times(white.inverse, times(white.whitening, ahead.kicks.T))
     weights = ahead.variances * ahead.commands
     certain = weights * ahead.commands * jnp.sum(kicks**2, axis=0)
-    error = weights * _times(kicks.T, white.surprise)
+    error = weights * times(kicks.T, white.surprise)
     return error, ahead.variances * jnp.maximum(1 - certain, 0)
-
-
-def _updated(ahead, white, seen):
-    """Spread, and errors of rate and response, after the rate was told.
-
-    With errors S x of the response and A x + c of the rate, where x is of unit covariance: x by the
-    square root of Andrews (1968), and then c by what is left.
-    """
-    root, cross = ahead.spread.response, white.cross
-    left = _times(white.inverse.T, white.surprise)
-    seen_by = _times(root, cross.T)
-    shrunk = _times(white.inverse.T, white.half)
-    back = seen.variances[:, None] * white.whitening.T
-    rate = _times(back, _times(white.whitening, white.own))
-    kept = white.half + shrunk
-    told = Spread(
-        rate=(rate + rate.T) / 2,
-        cross=_times(_times(back, kept), cross),
-        response=root - _times(_times(seen_by, shrunk), cross),
-    )
-    spread = vectors.chosen(seen.is_told > 0, told, ahead.spread._replace(rate=white.own))
-    error = seen.is_told * (seen.residual - _times(back, left))
-    return spread, error, _times(seen_by, left)
 
 
 def _stepped(mobility, step):

@@ -17,30 +17,13 @@ import chex
 import jax.numpy as jnp
 from flax import struct
 
-from attjax.control import linearized
+from attjax.control import linearized, square_root
 from attjax.control.covariance import product
 from attjax.control.linearized import AXES, Model
+from attjax.control.square_root import PAIRS, Spread
 from attjax.dynamics import vectors
 from attjax.dynamics.vectors import Vector
 from attjax.envs.context import Context
-
-PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-"""Elements of a symmetric matrix, in the order of N's errors."""
-
-class Spread(NamedTuple):
-    """Of errors S x of the response, with x of unit covariance, and A x + c of the rate.
-
-    A square root cannot come to be of no covariance by rounding.
-
-    Attributes:
-        rate: (3, 3) covariance of c, rad²/s².
-        cross: A, (3, errors).
-        response: S, (errors, errors): rows of mobility, as of PAIRS, and columns.
-    """
-
-    rate: chex.Array
-    cross: chex.Array
-    response: chex.Array
 
 
 class Identity(struct.PyTreeNode):
@@ -131,19 +114,13 @@ def unknowing(context: Context) -> Identity:
         spread=Spread(
             rate=jnp.zeros((3, 3), dtype),
             cross=jnp.zeros((3, len(root)), dtype),
-            response=_square_root(root),
+            response=square_root.of_wide(root),
         ),
     )
 
 
 def _both(a, b):
     return jnp.outer(a, b) + jnp.outer(b, a)
-
-
-def _square_root(matrix):
-    """A square S with S Sᵀ = M Mᵀ, of a matrix M with more columns."""
-    values, vectors = jnp.linalg.eigh(jnp.matmul(matrix, matrix.T, precision="highest"))
-    return vectors * jnp.sqrt(jnp.maximum(values, 0))
 
 
 def _vector(mobility, columns):

@@ -36,7 +36,7 @@ def doubt(world: World) -> Doubt:
         0.5
     """
     shape, torque = world.uncertainty, world.actuators
-    found = {}
+    found: dict[str, float] = {}
     if shape is not None:
         found |= {
             "inertia": _of_inverse(shape.inertia_factor),

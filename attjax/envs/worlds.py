@@ -27,7 +27,7 @@ from attjax.envs.inertia import drawn_inertia
 from attjax.envs.keys import world_key
 from attjax.envs.moving_parts import drawn_flexible, drawn_motors, drawn_wheels
 from attjax.envs.parameters import EnvParams, EnvState, control_period
-from attjax.envs.plant import Plant
+from attjax.envs.plant import Change, Plant
 from attjax.envs.sensors import drawn_sensing
 from attjax.envs.torques import torque_axes
 from attjax.world import World
@@ -92,7 +92,15 @@ def drawn_plant(
         wheel_speeds=wheel_speeds,
         flexible=flexible,
         deflection=deflection,
+        change=_change(world.uncertainty, draws),
     )
+
+
+def _change(given, draws):
+    if given is None or given.change_factor == 1:
+        return None
+    names = "change_factor", "change_time"
+    return Change(*(draws.number(name, getattr(given, name)) for name in names))
 
 
 def _orbit(world, draws):

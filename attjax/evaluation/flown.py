@@ -60,17 +60,23 @@ def decide(
     actions = []
     for n, controller in enumerate(controllers):
         part = slice(n * each, (n + 1) * each)
-        act, known, axis = controller, context, None
         if isinstance(controller, FlightLoop):
-            act = controller.controller
-            if controller.adapts:
-                own = jax.tree.map(lambda x, part=part: x[part], memory)
-                known, axis = jax.vmap(controller.believed, (0, None))(own, context), 0
-        actions.append(jax.vmap(act, (0, axis))(told[part], known))
+            own = jax.tree.map(lambda x, part=part: x[part], memory)
+            actions.append(_by_loop(controller, own, context, told[part]))
+        else:
+            actions.append(jax.vmap(controller, (0, None))(told[part], context))
     action = jnp.concatenate(actions)
     if loops:
         memory = jax.vmap(loops[0].after, (0, 0, None))(memory, action[:looped], context)
     return action, memory
+
+
+def _by_loop(loop, memory, context, observed):
+    """The actions of a loop's controller, by what it believes of each spacecraft if it adapts."""
+    if not loop.adapts:
+        return jax.vmap(loop.controller, (0, None))(observed, context)
+    believed = jax.vmap(loop.believed, (0, None))(memory, context)
+    return jax.vmap(loop.controller)(observed, believed)
 
 
 def estimated(memory: Memory | None, states: EnvState) -> chex.Array:
