@@ -172,15 +172,18 @@ def sensitivities(
         Three rows by the errors of rate, mobility and columns; and for each axis what an impulse
         of 1 N m s about it has become of the rate by the end.
     """
-    mean = vectors.scaled(0.5, vectors.add(period.before, period.after))
+    total, start = impulses(identity, period), period.before
+    if not model.held.value:  # given at the beginning
+        for impulse, column in zip(total, identity.columns):
+            start = vectors.add(start, vectors.scaled(impulse, column))
+    mean = vectors.scaled(0.5, vectors.add(start, period.after))
     momentum = vectors.times(model.inertia, mean)
     carried = linearized.rate_transition(momentum, mean, model)
     kept = carried
     if model.held.value:  # given all through the period, not at its beginning
         kept = [[(x + (i == j)) / 2 for j, x in enumerate(row)] for i, row in enumerate(carried)]
     turning = gyroscopic(identity.mobility, mean)
-    axes, total = len(identity.columns), impulses(identity, period)
-    rows = []
+    axes, rows = len(identity.columns), []
     for i in AXES:
         pushed = [kept[i][j] * total[a] for a in range(axes) for j in AXES]
         rows.append([*carried[i], *(model.period * x for x in turning[i]), *pushed])
