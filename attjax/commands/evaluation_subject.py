@@ -45,13 +45,15 @@ def complete(arguments: argparse.Namespace) -> None:
     """Fill in what depends on other flags.
 
     Raises:
-        UserError: a flag does not go with ``--robustness``.
+        UserError: flags do not go together.
     """
+    if arguments.adaptive and arguments.bare:
+        raise errors.UserError("--adaptive does not go with --bare: it is the flight loop's")
     if arguments.episodes is None:
         arguments.episodes = 1000 if arguments.robustness else 5000
     if not arguments.robustness:
         return
-    for flag in ("world", "bare", "sampled", "playback"):
+    for flag in ("world", "bare", "adaptive", "sampled", "playback"):
         if getattr(arguments, flag):
             raise errors.UserError(f"--{flag} does not go with --robustness")
 
@@ -112,6 +114,8 @@ def env(
     # Imported late: with it, --help and errors in the arguments would take seconds.
     from attjax.runs import build
 
+    if arguments.adaptive and world.wheels is not None:
+        raise errors.UserError("--adaptive: a flight loop cannot adapt to reaction wheels yet")
     with errors.one_line_errors(ValueError):
         run_config.check_world(world, spacecraft)
     rules = {"actions": arguments.actions or "discrete"}

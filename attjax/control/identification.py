@@ -87,7 +87,7 @@ def corrected(
         square_root.whitened(_own(ahead, identity), ahead.spread, seen).surprise ** 2
     )
     change = jnp.where(surprise > SURPRISING, 1, 0).astype(kicks.dtype)
-    ahead = _opened(identity, ahead, change)
+    ahead = _opened(identity, ahead, seen, change)
     white = square_root.whitened(_own(ahead, identity), ahead.spread, seen)
     strengths, doubts = _strengths(ahead, white)
     spread, error, response = square_root.updated(ahead.spread, white, seen)
@@ -142,12 +142,13 @@ def _own(ahead, identity):
     return rate + more * jnp.eye(3, dtype=rate.dtype)
 
 
-def _opened(identity, ahead, change):
+def _opened(identity, ahead, seen, change):
     """The same after a sudden change, where there was one.
 
     If something was commanded in the period, all may have changed in proportion, as by a mass that
-    came or went, or the strength of what was commanded. If not, the moments have. Each number may
-    be somewhat off besides, and what was known of how errors go together is lost.
+    came or went, or the strength of what was commanded. No mass takes all of an effect away, so the
+    first is the likelier the more is left of it. If nothing was commanded, the moments may have
+    changed. Each number may be somewhat off besides, and how errors went together is lost.
     """
     spread, axes = ahead.spread, len(ahead.kicks)
     is_on = jnp.where(ahead.commands != 0, change, 0)
@@ -160,7 +161,10 @@ def _opened(identity, ahead, change):
     each = SHARE_OF_EACH * jnp.append(sizes, lengths)
     deviations = jnp.sum(spread.response**2, axis=1)
     deviations = jnp.sqrt(deviations + (SHARE_OF_CHANGE * alone) ** 2 + each**2)
-    whole = SHARE_OF_CHANGE * most * response
+    strengths = jnp.stack(identity.strengths).reshape(is_on.shape)
+    kick = jnp.sum(jnp.sum(ahead.commands * strengths, axis=0)[:, None] * ahead.kicks, axis=0)
+    left = 1 + jnp.sum(kick * seen.residual) / jnp.maximum(jnp.sum(kick**2), LEAST)
+    whole = SHARE_OF_CHANGE * most * jnp.clip(left, 0, 1) * response
     shares = whole / jnp.maximum(deviations, LEAST)
     square = jnp.sum(shares**2)
     share = 1 / (1 + jnp.sqrt(1 + square))  # (√(1 + u²) − 1)/u², of the root of D² + w wᵀ
