@@ -66,8 +66,7 @@ def drawn_plant(
         axes: (axes, 3) unit vectors of the torque axes, body frame, as believed.
         frameskip: RK4 steps after the first in an agent step, where all spacecraft have the same.
     """
-    dtype = params.inertia.dtype
-    draws = Draws(key, dtype)
+    draws = Draws(key, params.inertia.dtype)
     start = Seen(state.quaternion, state.angular_velocity)
     inertia = drawn_inertia(world.uncertainty, draws, params.inertia)
     orbit = _orbit(world, draws)
@@ -81,7 +80,7 @@ def drawn_plant(
         key=jax.random.key_data(draws.key),
         inertia=inertia,
         actuators=_actuators(world, draws, gains, directions),
-        queue=empty_queue(most_delay, least_steps, params.torque_held, dtype, size),
+        queue=empty_queue(most_delay, least_steps, params.torque_held, draws.dtype, size),
         orbit=None if orbit is None else orbit[0],
         disturbances=_disturbances(world, draws, inertia, orbit),
         own_disturbances=tuple(x.drawn(draws) for x in world.own_disturbances),
