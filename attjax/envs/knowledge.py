@@ -139,8 +139,9 @@ def knowledge(
     tracker, gyro = (sensors.star_tracker, sensors.gyro) if sensors else (None, None)
     delay = _delay(world.actuators)
     torque, wrong = torque_noise(world, inertia, period), doubt(world)
+    wheels = _wheels(world.wheels, axes)
     if tracker is None and gyro is None and delay == 0:
-        return Knowledge(torque=torque, doubt=wrong)
+        return Knowledge(torque=torque, wheels=wheels, doubt=wrong)
     inertia_error = _inertia_error(world.uncertainty)
     along, across = _torque_errors(world.actuators)
     return Knowledge(
@@ -150,7 +151,7 @@ def knowledge(
         along=math.hypot(along, inertia_error),
         across=across,
         inertia=inertia_error,
-        wheels=_wheels(world.wheels, axes),
+        wheels=wheels,
         doubt=wrong,
         delay=delay,
     )
