@@ -64,6 +64,11 @@ def _add_who(group):
         "predictor looks ahead of known delays (the same where the world is ideal)"
     )
     group.add_argument("--bare", action="store_true", help=bare_help)
+    adaptive_help = (
+        "let the flight loop identify inertia and torques in flight, and tell the controllers what "
+        "it finds"
+    )
+    group.add_argument("--adaptive", action="store_true", help=adaptive_help)
     actions_help = (
         "how classical controllers without checkpoint act: by one of the torques (default), or by "
         "any about the three axes at once; a policy acts as it was trained to"
@@ -155,7 +160,8 @@ def _evaluate(arguments, controllers, env, plots, metrics, json_file):
     for name, controller in controllers.items():
         with evaluation_output.flying(name, episodes) as told:
             judged = judge(controller, env, episodes=episodes, seed=seed, progress=told)
-        results.append({"controller": name} | judged)
+        shown = f"{name}, adaptive" if arguments.adaptive else name
+        results.append({"controller": shown} | judged)
         if plots:
             folder = arguments.plot / name if arguments.compare else arguments.plot
             flight = plots.Flight(controller, env, params, seed, episodes)
@@ -198,7 +204,7 @@ def _flown(name, arguments, env, config):
 
     controller = _controller(name, arguments, env, config)
     is_plain = arguments.bare or arguments.robustness  # which flies each in both ways
-    return controller if is_plain else flight_loop(controller)
+    return controller if is_plain else flight_loop(controller, adapts=arguments.adaptive)
 
 
 def _controller(name, arguments, env, config):

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 
 POLICY = "policy"
 NOT_WITH = {
-    "robustness": ("world", "bare", "sampled", "playback", "fleet"),
+    "robustness": ("world", "bare", "adaptive", "sampled", "playback", "fleet"),
     "fleet": ("spacecraft", "world", "plot", "playback"),
+    "bare": ("adaptive",),
 }
 """Flags by the one that they do not go with."""
 
@@ -50,7 +51,7 @@ def complete(arguments: argparse.Namespace) -> None:
     """Fill in what depends on other flags.
 
     Raises:
-        UserError: a flag does not go with ``--robustness``.
+        UserError: flags do not go together.
     """
     if arguments.episodes is None:
         arguments.episodes = 1000 if arguments.robustness else 5000
@@ -118,6 +119,8 @@ def env(
     # Imported late: with it, --help and errors in the arguments would take seconds.
     from attjax.runs import build
 
+    if arguments.adaptive and world.wheels is not None:
+        raise errors.UserError("--adaptive: a flight loop cannot adapt to reaction wheels yet")
     with errors.one_line_errors(ValueError):
         run_config.check_world(world, spacecraft)
     rules = {"actions": arguments.actions or "discrete"}

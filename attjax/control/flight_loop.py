@@ -11,8 +11,9 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from attjax.control import belief, estimator
+from attjax.control import adaptation, belief, estimator, response
 from attjax.control.estimator import Estimate, Expected
+from attjax.control.response import Identity
 from attjax.dynamics import vectors
 from attjax.dynamics.actuators import Queue, empty_queue
 from attjax.dynamics.sensing import Measurement
@@ -28,12 +29,14 @@ class Memory(struct.PyTreeNode):
         expected: of sensors that sample between decisions.
         queue: of the torques that were commanded.
         time: decisions so far, int32.
+        identity: of the spacecraft; None: it is taken to be as believed.
     """
 
     estimate: Estimate
     expected: Expected
     queue: Queue
     time: chex.Array
+    identity: Identity | None = None
 
 
 class FlightLoop(struct.PyTreeNode):
@@ -41,6 +44,7 @@ class FlightLoop(struct.PyTreeNode):
 
     Attributes:
         controller: ``act(observation (11,), context) -> action``, a tree of arrays.
+        adapts: whether it identifies inertia and torques in flight, and flies by them.
 
     Example:
         >>> from attjax import AttitudeEnv
@@ -54,17 +58,21 @@ class FlightLoop(struct.PyTreeNode):
     """
 
     controller: Callable[[chex.Array, Context], chex.Array]
+    adapts: bool = struct.field(pytree_node=False, default=False)
 
     def init(self, context: Context) -> Memory | None:
         """The memory before the first decision; None where nothing need be remembered."""
+        context = adaptation.filtering(context) if self.adapts else context
         known = context.knowledge
         if known.is_truth:
             return None
         least_steps = 1 + (0 if context.steps_after is not None else context.agent_step.frameskip)
         held, dtype = context.agent_step.held, context.inertia.dtype
         size = 3 if known.wheels is None else len(known.wheels.wheels.axes)
+        size = response.valves_of(context) if self.adapts else size
         queue = empty_queue(known.delay, least_steps, held, dtype, size)
-        return Memory(*estimator.unknowing(context), queue, jnp.zeros((), jnp.int32))
+        identity = response.unknowing(context) if self.adapts else None
+        return Memory(*estimator.unknowing(context), queue, jnp.zeros((), jnp.int32), identity)
 
     def step(
         self, memory: Memory | None, measurement: Measurement, context: Context
@@ -80,8 +88,19 @@ class FlightLoop(struct.PyTreeNode):
             The action, an integer scalar or (3,) fractions, and the memory after it.
         """
         observation, memory = self.observed(memory, measurement, context)
-        action = self.controller(observation, context)
+        action = self.act(memory, observation, context)
         return action, self.after(memory, action, context)
+
+    def act(self, memory: Memory | None, observation: chex.Array, context: Context) -> chex.Array:
+        """The controller's action; memory and observation as of :meth:`observed`."""
+        return self.controller(observation, self.believed(memory, context))
+
+    def believed(self, memory: Memory | None, context: Context) -> Context:
+        """The context that the controller is given: the same, or with what has been identified."""
+        if memory is None or memory.identity is None:
+            return context
+        context = adaptation.filtering(context)
+        return adaptation.believed(context, memory.identity, memory.queue)
 
     def observed(
         self, memory: Memory | None, measurement: Measurement, context: Context
@@ -95,46 +114,67 @@ class FlightLoop(struct.PyTreeNode):
         """
         state: Any = measurement
         if memory is not None:
-            memory = _estimated(memory, measurement, context)
-            state = memory.estimate
+            memory = self._estimated(memory, measurement, context)
+            state, context = memory.estimate, self.believed(memory, context)
             if context.knowledge.delay:
-                state = belief.after_delay(state, memory.queue, context)
+                state = belief.after_delay(state, _bodily(memory, context), context)
         quaternion, rate = jnp.stack(state.quaternion), jnp.stack(state.angular_velocity)
+        if memory is not None and self.adapts:
+            rate = adaptation.leaned(rate, memory.estimate.torque, context)
         rules = context.kinematic_factor, context.observes_quaternion_rate
         return observations.observe(quaternion, rate, *rules), memory
+
+    def _estimated(self, memory, measurement, context):
+        """The memory with the estimate at this decision, and the queue seen from it."""
+        last, context = memory.time - 1, self.believed(memory, context)
+        before, queue = (memory.estimate, memory.expected), _bodily(memory, context)
+        predicted, expected = estimator.predicted(*before, queue, last, context)
+        first, identity = estimator.begun(memory.estimate, measurement, context), memory.identity
+        if identity is not None:
+            told = estimator.told_by(measurement, context)
+            seen = memory.estimate, predicted, expected, told
+            begun = adaptation.begun(identity, first)
+            identity, predicted = adaptation.identified(identity, memory.queue, seen, context)
+        estimate = estimator.corrected(predicted, expected, measurement, context)
+        has_begun = memory.time > 0
+        if identity is not None:
+            identity = vectors.chosen(has_begun, identity, begun)
+        queue = memory.queue
+        queue = vectors.chosen(has_begun, queue.later(belief.rk4_steps(context)), queue)
+        return memory.replace(
+            estimate=vectors.chosen(has_begun, estimate, first),
+            expected=vectors.chosen(has_begun, expected, memory.expected),
+            queue=queue,
+            identity=identity,
+        )
 
     def after(self, memory: Memory | None, action: chex.Array, context: Context) -> Memory | None:
         """The memory after an action; memory, action and context as of :meth:`step`."""
         if memory is None:
             return None
-        torque = belief.commanded_torque(action, context)
+        command = belief.commanded_torque if memory.identity is None else adaptation.commanded
+        torque = command(action, context)
         queue = memory.queue.and_then(context.knowledge.delay, torque)
         return memory.replace(queue=queue, time=memory.time + 1)
 
 
-def _estimated(memory, measurement, context):
-    """The memory with the estimate at this decision, and the queue seen from it."""
-    queue, last = memory.queue, memory.time - 1
-    before = memory.estimate, memory.expected
-    predicted, expected = estimator.predicted(*before, queue, last, context)
-    estimate = estimator.corrected(predicted, expected, measurement, context)
-    first = estimator.begun(memory.estimate, measurement, context)
-    has_begun = memory.time > 0
-    queue = vectors.chosen(has_begun, queue.later(belief.rk4_steps(context)), queue)
-    return memory.replace(
-        estimate=vectors.chosen(has_begun, estimate, first),
-        expected=vectors.chosen(has_begun, expected, memory.expected),
-        queue=queue,
-    )
+def _bodily(memory, context):
+    """The queue of torques about the body's axes, or those of wheels."""
+    if memory.identity is None:
+        return memory.queue
+    return adaptation.bodily(memory.queue, memory.identity, context)
 
 
-def flight_loop(controller: Callable[[chex.Array, Context], Any]) -> FlightLoop:
+def flight_loop(
+    controller: Callable[[chex.Array, Context], Any], adapts: bool = False
+) -> FlightLoop:
     """A controller with the default estimator and predictor.
 
     Args:
         controller: ``act(observation (11,), context) -> action``, or a flight loop already.
+        adapts: whether the loop identifies inertia and torques in flight, and flies by them.
     """
     if isinstance(controller, FlightLoop):
-        return controller
+        return controller.replace(adapts=adapts) if adapts else controller
     is_tree = isinstance(controller, jax.tree_util.Partial)
-    return FlightLoop(controller if is_tree else jax.tree_util.Partial(controller))
+    return FlightLoop(controller if is_tree else jax.tree_util.Partial(controller), adapts)
