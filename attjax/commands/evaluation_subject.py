@@ -45,13 +45,15 @@ def complete(arguments: argparse.Namespace) -> None:
     """Fill in what depends on other flags.
 
     Raises:
-        UserError: a flag does not go with ``--robustness``.
+        UserError: a flag does not go with another.
     """
+    if arguments.keep_out and not arguments.assured:
+        raise errors.UserError("--keep-out is for --assured")
     if arguments.episodes is None:
         arguments.episodes = 1000 if arguments.robustness else 5000
     if not arguments.robustness:
         return
-    for flag in ("world", "bare", "sampled", "playback"):
+    for flag in ("world", "bare", "sampled", "playback", "assured"):
         if getattr(arguments, flag):
             raise errors.UserError(f"--{flag} does not go with --robustness")
 

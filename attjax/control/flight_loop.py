@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from attjax.control import belief, estimator
+from attjax.control.assured import Assurance, assured
 from attjax.control.estimator import Estimate, Expected
 from attjax.dynamics import vectors
 from attjax.dynamics.actuators import Queue, empty_queue
@@ -128,13 +129,24 @@ def _estimated(memory, measurement, context):
     )
 
 
-def flight_loop(controller: Callable[[chex.Array, Context], Any]) -> FlightLoop:
-    """A controller with the default estimator and predictor.
+def flight_loop(
+    controller: Callable[[chex.Array, Context], Any],
+    *,
+    assurance: Assurance | None = None,
+    scores: Callable[[chex.Array, Context], chex.Array] | None = None,
+) -> FlightLoop:
+    """A controller with the default estimator and predictor, and with an assurance if asked for.
 
     Args:
         controller: ``act(observation (11,), context) -> action``, or a flight loop already.
+        assurance: that stands after it (:func:`attjax.control.assured.assurance`).
+        scores: of all actions for it, as of :func:`attjax.control.assured.assured`.
     """
     if isinstance(controller, FlightLoop):
-        return controller
+        if assurance is None:
+            return controller
+        controller = controller.controller
+    if assurance is not None:
+        return FlightLoop(assured(controller, assurance, scores))
     is_tree = isinstance(controller, jax.tree_util.Partial)
     return FlightLoop(controller if is_tree else jax.tree_util.Partial(controller))

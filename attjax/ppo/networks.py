@@ -177,6 +177,14 @@ class Policy:
         noise = self.distribution_family.noise(key, (), observation.dtype)
         return self._decided(params, self.encode(observation, context), noise)
 
+    def scores(self, params: dict, observation: chex.Array, context: Context) -> chex.Array:
+        """(actions,) logits of one observation, MASKED_LOGIT where masked."""
+
+        def outputs(params, inputs):
+            return self.outputs(params, inputs).T
+
+        return _one_of_a_batch(outputs)(params, self.encode(observation, context))
+
     def _decided(self, params, inputs, noise):
         """The action for one spacecraft's inputs: drawn, or the mode where there is no noise."""
 
