@@ -3,6 +3,7 @@
 import chex
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from attjax import dynamics
 from attjax.control.keep_out import Cones
@@ -43,8 +44,9 @@ def at_random(key: chex.PRNGKey, observation: chex.Array, context: Context) -> c
         key: of them.
         observation, context: as of :func:`fastest`.
     """
-    for word in jax.lax.bitcast_convert_type(observation.astype(jnp.float32), jnp.uint32):
-        key = jax.random.fold_in(key, word)
+    words = jax.lax.bitcast_convert_type(observation.astype(jnp.float32), jnp.uint32)
+    word = jnp.sum(words * np.arange(1, 2 * len(words), 2, dtype=np.uint32))
+    key = jax.random.fold_in(key, word)
     return jax.random.uniform(key, (len(context.torque_table),))
 
 

@@ -46,6 +46,7 @@ class Assurance(struct.PyTreeNode):
     Attributes:
         plants: that it is for.
         stopping: what braking does to them.
+        period: between two decisions, s.
         limit: of P, of which rate and wheels' speeds follow, rad/s.
         error: of the rate that is told, when a torque begins, rad/s.
         cones: that are kept out of; None: there are none.
@@ -54,6 +55,7 @@ class Assurance(struct.PyTreeNode):
 
     plants: Plants
     stopping: Stopping
+    period: chex.Array
     limit: chex.Array
     error: chex.Array
     cones: Cones | None
@@ -88,11 +90,10 @@ class Assurance(struct.PyTreeNode):
         squared, change = self.changes(rate)
         keeps = (squared + change <= self.limit**2) | (change <= 0)
         if self.cones is not None:
-            after = square_root(jnp.maximum(squared + change, 0))
-            most = square_root(squared + jnp.maximum(change, 0))
-            turning = self.stopping.period * most + self.stopping.angle(after)
-            need = self.cones.per_rate * (turning + self.reserve)
-            keeps &= jnp.min(self.cones.clearance(quaternion)) >= need
+            clearance = jnp.min(self.cones.clearance(quaternion)) / self.cones.per_rate
+            most = square_root(squared) + jnp.max(self.plants.most_growth)
+            angle = clearance - self.reserve - self.period * most
+            keeps &= squared + change <= self.stopping.peak(angle) ** 2
         return keeps | (jnp.arange(len(change)) == jnp.argmin(change))
 
     def chosen(self, observation: chex.Array, scores: chex.Array) -> chex.Array:
@@ -157,7 +158,8 @@ def _at_level(of_these, context, within, limit, keep_out):
     error, at_angle = _errors(of_these, context, within, limit)
     braking = stopping(of_these, limit, error, context.control_period, within.duration)
     reserve = at_angle + braking.rest * within.duration
-    return Assurance(of_these, braking, limit, error, cones_of(keep_out, context), reserve)
+    cones, period = cones_of(keep_out, context), jnp.asarray(context.control_period)
+    return Assurance(of_these, braking, period, limit, error, cones, reserve)
 
 
 def _errors(of_these, context, within, limit):

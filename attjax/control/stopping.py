@@ -26,32 +26,29 @@ class Stopping(struct.PyTreeNode):
 
     Attributes:
         edges: (phases + 1,) P between the phases, falling, rad/s.
+        angles: (phases + 1,) ∫P dt from there until it is at rest, at most, rad.
         decrease: (phases,) of P in a period, at least, rad/s; 0 where none is certain.
         rest: P once it is braked as far as that goes, and ever after, rad/s.
-        period: s.
     """
 
     edges: chex.Array
+    angles: chex.Array
     decrease: chex.Array
     rest: chex.Array
-    period: chex.Array
 
     @property
     def is_certain(self) -> chex.Array:
         """Whether braking is, at the limit."""
         return self.decrease[0] > 0
 
-    def angle(self, peak: chex.Array) -> chex.Array:
-        """∫P dt from such a P (...), rad/s, until it is at rest, at most; rad.
+    def peak(self, angle: chex.Numeric) -> chex.Array:
+        """A P that is at rest within that angle, rad/s; 0 where there is none.
 
-        A P that falls by at least a decrease δ(P) in a period Δ, sampled at its beginnings, sums up
-        to at most P + ∫ P dP/δ.
+        Between two edges the angle is convex in P, and at most what it is on the straight line.
         """
-        low, high = self.edges[1:], self.edges[:-1]
-        is_braked = self.decrease > 0
-        pace = jnp.where(is_braked, 0.5 / jnp.where(is_braked, self.decrease, 1), 0)
-        part = jnp.clip(peak[..., None], low, high) ** 2 - low**2
-        return self.period * (peak + jnp.sum(pace * part, axis=-1))
+        edges, angles = (jnp.append(x, 0) for x in (self.edges, self.angles))
+        share = (angle - angles[1:]) / (angles[:-1] - angles[1:])
+        return jnp.sum(jnp.clip(share, 0, 1) * (edges[:-1] - edges[1:]))
 
 
 def directions(cells: int) -> np.ndarray:
@@ -106,11 +103,14 @@ def stopping(
     decreases = jax.lax.cummin(jax.vmap(decrease)(edges[:-1], edges[1:]))
     grown = jax.vmap(lambda edge: coasting(plants, edge, error))(edges)
     rests = square_root(edges**2 + grown)
+    # P that falls by at least δ(P) in each period sums up, sampled at its beginnings, to at most
+    # the first of it and ∫ P dP/δ.
     in_phases = (edges[:-1] ** 2 - edges[1:] ** 2) / 2 / jnp.maximum(decreases, 1e-30)
-    angles = period * jnp.cumsum(jnp.append(0, in_phases)) + duration * rests
-    last = jnp.argmin(angles)
-    decreases = jnp.where(jnp.arange(PHASES) < last, jnp.maximum(decreases, 0), 0)
-    return Stopping(edges, decreases, rests[last], jnp.asarray(period, dtype))
+    last = jnp.argmin(period * jnp.append(0, jnp.cumsum(in_phases)) + duration * rests)
+    is_braked = jnp.arange(PHASES) < last
+    below = jnp.cumsum(jnp.where(is_braked, in_phases, 0)[::-1])[::-1]
+    angles = period * (edges + jnp.append(below, 0))
+    return Stopping(edges, angles, jnp.where(is_braked, decreases, 0), rests[last])
 
 
 def coasting(plants: Plants, peak: chex.Numeric, error: chex.Numeric) -> chex.Array:
