@@ -37,6 +37,9 @@ FAST = ("ideal", "each moment ±20 %", "noise, delay, inertia and torque togethe
 """Conditions that are flown with cones as well, and at 40 Hz as well."""
 
 
+PRETRAINED = Path(__file__).resolve().parents[1] / "pretrained" / "precise"
+
+
 class Condition(NamedTuple):
     """What is flown: a name, the simulator, cones."""
 
@@ -109,7 +112,7 @@ def policies(condition: Condition, cones: Any) -> dict:
     if cones is not None:
         found["into the cones"] = partial(adversaries.into_cones, cones)
     if condition.env.spacecraft == LM50:
-        policy, params = checkpoint.restore_network(common.ROOT / "pretrained" / "precise")
+        policy, params = checkpoint.restore_network(PRETRAINED)
         found["precise"] = partial(policy.scores, params)
     return found
 

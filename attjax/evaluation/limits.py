@@ -105,7 +105,7 @@ def _fly_block(crew, env, within, keys):
     params, keys = env.default_params, jnp.concatenate([keys] * len(crew))
     observation, state = jax.vmap(env.reset, (0, None))(keys, params)
     keys, judge = jax.vmap(steps_key)(keys), _judge(env, within, state)
-    memory = flying.first_memory(crew, env.context(params), len(keys))
+    memory = flying.first_memory(crew, env.context(params), len(keys) // len(crew))
 
     def step(index, carry):
         *before, nearest = carry
