@@ -110,7 +110,7 @@ def policies(condition: Condition, cones: Any) -> dict:
     import jax
 
     from attjax.control import adversaries
-    from attjax.runs import checkpoint
+    from attjax.runs.flight import policy_scores
 
     partial = jax.tree_util.Partial
     found = {
@@ -120,8 +120,7 @@ def policies(condition: Condition, cones: Any) -> dict:
     if cones is not None:
         found["into the cones"] = partial(adversaries.into_cones, cones)
     if condition.name.partition(", ")[0] in FAST and condition.env.spacecraft.name == "LM50":
-        policy, params = checkpoint.restore_network(PRETRAINED)
-        found["precise"] = partial(policy.scores, params)
+        found["precise"] = policy_scores(PRETRAINED)
     return found
 
 

@@ -42,21 +42,3 @@ def told(assurance: "Assurance | None") -> dict[str, Any]:
         return {}
     cones = 0 if assurance.cones is None else len(assurance.cones.axes)
     return {"assured": bool(assurance.is_certain), "keep_out": cones}
-
-
-def scores_of(folder: Any, update: int | None) -> Any:
-    """The logits of a policy, by which actions are ranked.
-
-    Args:
-        folder: of its run.
-        update: None: the newest.
-
-    Raises:
-        FolderError: there is no checkpoint.
-    """
-    import jax
-
-    from attjax.runs import checkpoint
-
-    policy, params = checkpoint.restore_network(folder, update)
-    return jax.tree_util.Partial(policy.scores, params)

@@ -202,13 +202,13 @@ def _write_playback(how, controllers):
 def _flown(name, arguments, env, config, assurance):
     from attjax.control.assured import assured as under
     from attjax.control.flight_loop import flight_loop
-    from attjax.runs import checkpoint
+    from attjax.runs import checkpoint, flight
 
     controller, scores = _controller(name, arguments, env, config), None
     if assurance is not None:
         if name == POLICY and not arguments.sampled:
             update = checkpoint.best(arguments.checkpoint) if arguments.best else None
-            scores = assured.scores_of(arguments.checkpoint, update)
+            scores = flight.policy_scores(arguments.checkpoint, update)
         controller = under(controller, assurance, scores)
     is_plain = arguments.bare or arguments.robustness  # which flies each in both ways
     return controller if is_plain else flight_loop(controller)

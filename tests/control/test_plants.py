@@ -35,7 +35,7 @@ OFF = {
         "share": np.stack([np.full(19, 0.9), np.full(19, 1.1)]), "offset": np.full(19, 1e-5),
     },
 }  # fmt: skip
-COUNT = 4000
+COUNT = 1500
 
 
 def believed(craft):
@@ -105,7 +105,7 @@ def test_coefficients_are_reached(x64):
     context, _ = believed("pulses")
     for factors in ((0.9, 1.1), (0.7, 1.3), (0.5, 1.5)):
         found = plants(context, within(factors=factors)).coefficients
-        moments = LM50 * ends(rng, *factors, (400_000, 3))
+        moments = LM50 * ends(rng, *factors, (100_000, 3))
         keeps = 2 * np.max(moments, axis=1) <= np.sum(moments, axis=1)
         moments = moments[keeps]
         low, high = (f(moments, axis=1)[:, None] for f in (np.min, np.max))
@@ -126,7 +126,7 @@ def test_the_worst_plant_that_is_sought_stays_within(x64, craft):
     rng = np.random.default_rng(3)
     context, tensor = believed(craft)
     bounds = within(**OFF["all"])
-    of_these, count = plants(context, bounds), 300
+    of_these, count = plants(context, bounds), 200
     action = rng.integers(1, 19, count)
     table, duration = np.asarray(context.torque_table, float), float(context.torque_duration)
     impulse = table[action] * duration
@@ -134,7 +134,7 @@ def test_the_worst_plant_that_is_sought_stays_within(x64, craft):
     principal = jnp.asarray(told) @ of_these.axes
     work = np.asarray(jax.vmap(of_these.work)(principal))[np.arange(count), action]
     best, sought = np.full(count, -np.inf), None
-    for trial in range(400):
+    for trial in range(150):
         seed = np.random.default_rng(trial)
         inertia, given = drawn(seed, tensor, bounds, (impulse, action), count)
         fresh = [inertia, given, unit(seed, count), unit(seed, count)]
@@ -144,16 +144,10 @@ def test_the_worst_plant_that_is_sought_stays_within(x64, craft):
                 np.where(k.reshape(-1, *[1] * (x.ndim - 1)), y, x)
                 for k, x, y in zip(kept, fresh, sought)
             ]
-        inertia, given, pushed, error = fresh
+        inertia, given, _, error = fresh
         rate = told + bounds.rate * error
-        after = after_period(
-            inertia,
-            rate,
-            given,
-            bounds.disturbance * pushed,
-            float(context.control_period),
-            duration,
-        )
+        pushed, period = bounds.disturbance * fresh[2], float(context.control_period)
+        after = after_period(inertia, rate, given, pushed, period, duration)
         before = peak_squared(inertia, rate)
         beside = jax.vmap(of_these.beside, (0, None))(np.sqrt(before), bounds.rate)
         bound = 2 * work + np.asarray(beside)[np.arange(count), action]

@@ -4,7 +4,7 @@ import numpy as np
 
 from attjax.envs.bounds import Bounds, WheelBounds
 
-STEPS = 24
+STEPS = 6
 
 
 def peak_squared(inertia, rate):
