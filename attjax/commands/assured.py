@@ -42,3 +42,11 @@ def told(assurance: "Assurance | None") -> dict[str, Any]:
         return {}
     cones = 0 if assurance.cones is None else len(assurance.cones.axes)
     return {"assured": bool(assurance.is_certain), "keep_out": cones}
+
+
+def line(assurance: "Assurance") -> str:
+    """What the report says of it."""
+    cones = told(assurance)["keep_out"]
+    limits = f"limits and {cones} cone{'s' * (cones > 1)}" if cones else "limits"
+    how = "for every plant that the world states" if assurance.is_certain else "as well as it can"
+    return f"assured: {limits}, {how}"

@@ -182,6 +182,8 @@ def _evaluate(how, controllers, plots, metrics, json_file):
             tables.print_comparison(results, env.spacecraft)
         else:
             tables.print_report(results[0], env.spacecraft)
+        if assurance is not None:
+            print(assured.line(assurance))
         print(f"evaluated in {seconds:.1f} s, compilation included")
     return 0
 

@@ -11,6 +11,7 @@ docs/assurance.md.
 import itertools
 
 import chex
+import jax
 import jax.numpy as jnp
 from flax import struct
 
@@ -126,6 +127,7 @@ class Plants(struct.PyTreeNode):
         return squared + 2 * error * self.sensitivity
 
 
+@jax.jit
 def plants(context: Context, bounds: Bounds) -> Plants:
     """The plants of a belief.
 

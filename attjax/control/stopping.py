@@ -26,9 +26,11 @@ class Stopping(struct.PyTreeNode):
 
     Attributes:
         edges: (phases + 1,) P between the phases, falling, rad/s.
-        angles: (phases + 1,) ∫P dt from there until it is at rest, at most, rad.
+        angles: (phases + 1,) ∫P dt from there until it is at rest, at most, rad. Below the rate of
+            rest it is a period's.
         decrease: (phases,) of P in a period, at least, rad/s; 0 where none is certain.
-        rest: P once it is braked as far as that goes, and ever after, rad/s.
+        rest: P once it is braked so far that more would turn it farther in a flight, and ever
+            after, rad/s.
     """
 
     edges: chex.Array
@@ -72,6 +74,7 @@ def directions(cells: int) -> np.ndarray:
     return points / np.linalg.norm(points, axis=1, keepdims=True)
 
 
+@jax.jit
 def stopping(
     plants: Plants,
     limit: chex.Numeric,
@@ -107,10 +110,9 @@ def stopping(
     # the first of it and ∫ P dP/δ.
     in_phases = (edges[:-1] ** 2 - edges[1:] ** 2) / 2 / jnp.maximum(decreases, 1e-30)
     last = jnp.argmin(period * jnp.append(0, jnp.cumsum(in_phases)) + duration * rests)
-    is_braked = jnp.arange(PHASES) < last
-    below = jnp.cumsum(jnp.where(is_braked, in_phases, 0)[::-1])[::-1]
-    angles = period * (edges + jnp.append(below, 0))
-    return Stopping(edges, angles, jnp.where(is_braked, decreases, 0), rests[last])
+    counted = jnp.where(jnp.arange(PHASES) < last, in_phases, 0)
+    angles = period * (edges + jnp.append(jnp.cumsum(counted[::-1])[::-1], 0))
+    return Stopping(edges, angles, jnp.maximum(decreases, 0), rests[last])
 
 
 def coasting(plants: Plants, peak: chex.Numeric, error: chex.Numeric) -> chex.Array:

@@ -117,6 +117,15 @@ def test_the_rate_of_an_angle_is_the_inverse(x64):
     assert float(braking_of.peak(100.0)) == pytest.approx(LIMIT)
 
 
+def test_of_a_short_flight_braking_is_as_certain():
+    """Though it is not worth while: in 10 ms nothing turns far."""
+    _, _, at_length = braking(OFF["exact"])
+    _, _, at_once = braking(OFF["exact"]._replace(duration=0.01))
+    assert at_once.is_certain and np.all(at_once.decrease == at_length.decrease)
+    assert float(at_once.rest) == pytest.approx(LIMIT) and float(at_length.rest) < 0.001
+    assert at_once.angles[0] == pytest.approx(LIMIT * PERIOD)
+
+
 def test_torques_that_are_too_weak_brake_nothing():
     strong = within(disturbance=0.2)
     _, of_these, braking_of = braking(strong)
