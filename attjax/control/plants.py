@@ -82,6 +82,14 @@ class Plants(struct.PyTreeNode):
         """(actions,) the most that P grows in a period, but for coasting, rad/s."""
         return self.growth + self.pushed
 
+    @property
+    def excess(self) -> chex.Array:
+        """The most that the bound of P can be of the P of a plant, were the rate told exactly."""
+        of = self.coefficients
+        lightest = of.most_work / of.growth
+        least = of.least_work * lightest - (jnp.max(of.form) - 1) * self.turned
+        return jnp.sqrt(jnp.max(self.form / jnp.maximum(least, 1)))
+
     def peak(self, rate: chex.Array, error: chex.Numeric) -> chex.Array:
         """The most that P can be at a rate (3,), principal axes, told with an error; rad/s."""
         return square_root(jnp.sum(self.form * rate**2)) + self.of_error(error)

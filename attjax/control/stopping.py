@@ -98,8 +98,11 @@ def stopping(
 
     def decrease(high, low):
         share = 1 - plants.of_error(error) / low
-        # Of P it is a sum of powers from P⁻¹ up, so that one of the ends has the most.
-        beside = jnp.maximum(*(plants.beside(p, error) / (2 * p) for p in (low, high)))
+        # Of P it is a sum of powers from P⁻¹ up, so that one of the ends has the most. The action
+        # is chosen by a bound of P, not by P.
+        taken = [plants.excess * p + 2 * plants.of_error(error) for p in (low, high)]
+        besides = (plants.beside(x, error) / (2 * p) for x, p in zip(taken, (low, high)))
+        beside = jnp.maximum(*besides)
         certain = jnp.where((lowering > 0) & (share > 0), share * lowering - beside, -jnp.inf)
         return jnp.min(jnp.max(certain, axis=-1))
 
