@@ -1,7 +1,4 @@
-"""How far the plant can be from what is believed of it: bounds, where knowledge has deviations.
-
-All of it follows from the world's description, so far as that has bounds.
-"""
+"""How far the plant can be from what is believed of it, so far as its world's description says."""
 
 import itertools
 import math
@@ -97,12 +94,7 @@ def bounds(world: World, spacecraft: Spacecraft, context: Context) -> Bounds:
         (0.9, 1.1)
     """
     _check_covered(world, context)
-    uncertainty, wheels = world.uncertainty, None
-    factors, turned = (1.0, 1.0), 0.0
-    if uncertainty is not None:
-        given = uncertainty.inertia_factor, uncertainty.moment_factor
-        factors = math.prod(map(low, given)), math.prod(map(high, given))
-        turned = math.radians(min(high(uncertainty.axes_turned_deg), 180))
+    (factors, turned), wheels = _inertia(world.uncertainty), None
     moments = np.linalg.eigvalsh(_tensor(spacecraft))
     torque = largest_disturbance(world, factors[1] * moments)
     if world.wheels is not None:
@@ -123,6 +115,15 @@ def bounds(world: World, spacecraft: Spacecraft, context: Context) -> Bounds:
         duration=spacecraft.duration,
         wheels=wheels,
     )
+
+
+def _inertia(uncertainty):
+    """Factors of the moments, and how far the axes can be turned, rad."""
+    if uncertainty is None:
+        return (1.0, 1.0), 0.0
+    given = uncertainty.inertia_factor, uncertainty.moment_factor
+    factors = math.prod(map(low, given)), math.prod(map(high, given))
+    return factors, math.radians(min(high(uncertainty.axes_turned_deg), 180))
 
 
 def _check_covered(world, context):
