@@ -20,6 +20,9 @@ CELLS = 48
 PHASES, RATIO = 28, 0.7
 """Ranges of P from the limit down, each so much of the one before."""
 
+TENTH = 6
+"""Of the phases, that which begins at about a tenth of the limit."""
+
 
 class Stopping(struct.PyTreeNode):
     """What braking does at least, from the limit down.
@@ -89,7 +92,7 @@ def stopping(
         limit: of P, rad/s.
         error: of the rate that is told, rad/s.
         period: s.
-        duration: of a flight, s: down to where it is braked so that the body turns least in it.
+        duration: of a flight, s.
     """
     dtype = plants.form.dtype
     grid = jnp.asarray(directions(CELLS), dtype) / jnp.sqrt(plants.form)
@@ -112,7 +115,10 @@ def stopping(
     # P that falls by at least δ(P) in each period sums up, sampled at its beginnings, to at most
     # the first of it and ∫ P dP/δ.
     in_phases = (edges[:-1] ** 2 - edges[1:] ** 2) / 2 / jnp.maximum(decreases, 1e-30)
-    last = jnp.argmin(period * jnp.append(0, jnp.cumsum(in_phases)) + duration * rests)
+    # What is left of the rate turns the body all through a flight, however slow it was before: it is
+    # braked down to where, from a tenth of the limit, it turns least in all.
+    slow = jnp.where(jnp.arange(PHASES) < TENTH, 0, in_phases)
+    last = jnp.argmin(period * jnp.append(0, jnp.cumsum(slow)) + duration * rests)
     counted = jnp.where(jnp.arange(PHASES) < last, in_phases, 0)
     angles = period * (edges + jnp.append(jnp.cumsum(counted[::-1])[::-1], 0))
     return Stopping(edges, angles, jnp.maximum(decreases, 0), rests[last])

@@ -118,12 +118,18 @@ def test_the_rate_of_an_angle_is_the_inverse(x64):
 
 
 def test_of_a_short_flight_braking_is_as_certain():
-    """Though it is not worth while: in 10 ms nothing turns far."""
+    """Though it is not worth while to brake far: in 10 ms nothing turns."""
     _, _, at_length = braking(OFF["exact"])
     _, _, at_once = braking(OFF["exact"]._replace(duration=0.01))
     assert at_once.is_certain and np.all(at_once.decrease == at_length.decrease)
-    assert float(at_once.rest) == pytest.approx(LIMIT) and float(at_length.rest) < 0.001
-    assert at_once.angles[0] == pytest.approx(LIMIT * PERIOD)
+    assert 0.05 * LIMIT < float(at_once.rest) < 0.2 * LIMIT and float(at_length.rest) < 0.001
+
+
+def test_what_is_left_of_the_rate_is_little_where_braking_takes_long():
+    """Of plants that are known badly, at the limit it takes more than the whole flight."""
+    badly = within(factors=(0.7, 1.3), duration=15.0)
+    _, _, braking_of = braking(badly)
+    assert braking_of.is_certain and 15 * float(braking_of.rest) < 0.2
 
 
 def test_torques_that_are_too_weak_brake_nothing():
