@@ -115,8 +115,8 @@ def stopping(
     # P that falls by at least δ(P) in each period sums up, sampled at its beginnings, to at most
     # the first of it and ∫ P dP/δ.
     in_phases = (edges[:-1] ** 2 - edges[1:] ** 2) / 2 / jnp.maximum(decreases, 1e-30)
-    # What is left of the rate turns the body all through a flight, however slow it was before: it is
-    # braked down to where, from a tenth of the limit, it turns least in all.
+    # What is left of the rate turns the body all through a flight, however slow it was before: it
+    # is braked down to where, from a tenth of the limit, it turns least in all.
     slow = jnp.where(jnp.arange(PHASES) < TENTH, 0, in_phases)
     last = jnp.argmin(period * jnp.append(0, jnp.cumsum(slow)) + duration * rests)
     counted = jnp.where(jnp.arange(PHASES) < last, in_phases, 0)
