@@ -119,7 +119,7 @@ def policies(condition: Condition, cones: Any) -> dict:
     }
     if cones is not None:
         found["into the cones"] = partial(adversaries.into_cones, cones)
-    if condition.name.partition(", ")[0] in FAST and condition.env.spacecraft.name == "LM50":
+    if condition.name.startswith(FAST):
         found["precise"] = policy_scores(PRETRAINED)
     return found
 
