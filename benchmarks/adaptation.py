@@ -12,6 +12,7 @@ import json
 import jax
 
 from attjax import AttitudeEnv, flight_loop, load_policy
+from attjax.control.assured import assurance
 from attjax.control.classical import CONTROLLERS
 from attjax.evaluation.episodes import fly_side_by_side
 from attjax.evaluation.ladder import conditions
@@ -35,16 +36,19 @@ def main() -> None:
     parser.add_argument("--controller", default="phase-plane", help="a law's name, or a checkpoint")
     parser.add_argument("--frameskip", type=int, default=5)
     parser.add_argument("--episodes", type=int, default=1000)
+    parser.add_argument("--assured", action="store_true", help="under run-time assurance")
     given = parser.parse_args()
     known = given.controller in CONTROLLERS
     law = CONTROLLERS[given.controller] if known else load_policy(given.controller)
     ladder = conditions(AttitudeEnv().spacecraft, given.frameskip) | CHANGES
     for name in given.conditions:
         env = AttitudeEnv(given.frameskip, world=ladder[name])
+        under = assurance(env) if given.assured else None
         for adapts in (False, True):
-            loop, key = flight_loop(law, adapts=adapts), jax.random.key(0)
+            loop, key = flight_loop(law, adapts=adapts, assurance=under), jax.random.key(0)
             (flown,) = fly_side_by_side((loop,), env, env.default_params, key, given.episodes)
-            row = {"condition": name, "adapts": adapts} | outcome(flown, env)
+            row = {"condition": name, "adapts": adapts, "assured": given.assured}
+            row |= outcome(flown, env)
             print(json.dumps(row), flush=True)
 
 

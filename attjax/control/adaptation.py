@@ -12,6 +12,7 @@ from attjax.control.linearized import AXES
 from attjax.control.response import Identity, Period
 from attjax.dynamics import rigid_body, vectors
 from attjax.dynamics.actuators import Queue
+from attjax.envs import observation as observations
 from attjax.envs.context import Context
 from attjax.envs.torques import applied_torque
 
@@ -105,29 +106,40 @@ def _product(a, b):
 
 def bodily(queue: Queue, identity: Identity, context: Context) -> Queue:
     """The queue of torques about the body's axes, of one of (valves,) each."""
-    table = torques(identity, context)
+    return _along(torques(identity, context), queue)
+
+
+def given(queue: Queue, context: Context) -> Queue:
+    """The same, of torques as they were believed to be before the flight."""
+    axes = response.torque_directions(context)
+    return _along(jnp.tile(axes, (queue.torques.shape[1] // len(axes), 1)), queue)
+
+
+def _along(table, queue):
     found = jnp.sum(queue.torques[:, :, None] * table, axis=1)
     return Queue(queue.starts, found)
 
 
-def leaned(rate: chex.Array, torque: Any, context: Context) -> chex.Array:
-    """The rate (3,) that a controller must be shown to hold against a constant torque d.
+def leaned(observation: chex.Array, torque: Any, context: Context) -> chex.Array:
+    """The observation (11,) that a controller must be shown to hold against a constant torque d.
 
     It takes out what it is shown by impulses at once, and so holds a target where it is shown 0 on
     average. A torque of the duration τ that undoes d in each period T leaves the attitude where it
     is if the rate is N d T (½ − τ/2T) when it begins; shown N d T, it asks for that torque.
 
     Args:
-        rate: as estimated, rad/s.
+        observation: (11,) Eq. 11, as estimated.
         torque: d, three components, N m; None: there is none.
         context: as believed.
     """
     if torque is None:
-        return rate
+        return observation
     share = (1 + context.torque_duration / context.control_period) / 2
     turning = rigid_body.inverse(context.inertia)
     pushed = jnp.matmul(turning, jnp.stack(torque), precision="highest")
-    return rate + share * context.control_period * pushed
+    rate = observation[observations.ANGULAR_VELOCITY] + share * context.control_period * pushed
+    rules = context.kinematic_factor, context.observes_quaternion_rate
+    return observations.observe(observation[observations.QUATERNION], rate, *rules)
 
 
 def begun(identity: Identity, estimate: Any) -> Identity:

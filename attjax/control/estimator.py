@@ -133,7 +133,8 @@ def corrected(
         return _as_told(estimate, told)
     estimate = estimate.replace(wheel_speeds=told.wheel_speeds)
     noise = linearized.noise(context)
-    return together(measured.correct, estimate, expected, told, noise)
+    estimate = together(measured.correct, estimate, expected, told, noise)
+    return _as_told(estimate, told) if context.knowledge.is_told else estimate
 
 
 def begun(estimate: Estimate, measurement: Measurement, context: Context) -> Estimate:

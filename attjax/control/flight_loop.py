@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from attjax.control import adaptation, belief, estimator, response
+from attjax.control.assured import Assurance, ranking
 from attjax.control.estimator import Estimate, Expected
 from attjax.control.response import Identity
 from attjax.dynamics import vectors
@@ -43,8 +44,11 @@ class FlightLoop(struct.PyTreeNode):
     """Estimator, predictor and controller: pure, and a tree of arrays.
 
     Attributes:
-        controller: ``act(observation (11,), context) -> action``, a tree of arrays.
+        controller: ``act(observation (11,), context) -> action``, a tree of arrays; None where
+            there are scores.
         adapts: whether it identifies inertia and torques in flight, and flies by them.
+        assurance: that lets through only actions that lead beyond no limit; None: there is none.
+        scores: of all actions for it, ``scores(observation, context) -> (actions,)``.
 
     Example:
         >>> from attjax import AttitudeEnv
@@ -57,8 +61,10 @@ class FlightLoop(struct.PyTreeNode):
         2
     """
 
-    controller: Callable[[chex.Array, Context], chex.Array]
+    controller: Any
     adapts: bool = struct.field(pytree_node=False, default=False)
+    assurance: Assurance | None = None
+    scores: Callable[[chex.Array, Context], chex.Array] | None = None
 
     def init(self, context: Context) -> Memory | None:
         """The memory before the first decision; None where nothing need be remembered."""
@@ -92,8 +98,24 @@ class FlightLoop(struct.PyTreeNode):
         return action, self.after(memory, action, context)
 
     def act(self, memory: Memory | None, observation: chex.Array, context: Context) -> chex.Array:
-        """The controller's action; memory and observation as of :meth:`observed`."""
-        return self.controller(observation, self.believed(memory, context))
+        """The action that is decided on; memory and observation as of :meth:`observed`.
+
+        What is proved of an assurance is of the spacecraft that was believed before the flight and
+        all within bounds of it. So it is told the rate as it is, not leaned, and a delay is looked
+        across as was believed then; what has been identified is for the controller before it.
+        """
+        known, shown = self.believed(memory, context), observation
+        if memory is not None and self.adapts:
+            shown = adaptation.leaned(observation, memory.estimate.torque, known)
+        if self.assurance is None or self.scores is None:
+            return self.controller(shown, known)
+        if memory is not None and self.adapts and known.knowledge.delay:
+            estimate = memory.estimate
+            if context.knowledge.is_told:  # whose bounds are of any torque, not of one estimated
+                estimate = estimate.replace(torque=None)
+            queue = adaptation.given(memory.queue, context)
+            observation = _ahead(estimate, queue, context)
+        return self.assurance.chosen(observation, self.scores(shown, known))
 
     def believed(self, memory: Memory | None, context: Context) -> Context:
         """The context that the controller is given: the same, or with what has been identified."""
@@ -105,24 +127,18 @@ class FlightLoop(struct.PyTreeNode):
     def observed(
         self, memory: Memory | None, measurement: Measurement, context: Context
     ) -> tuple[chex.Array, Memory | None]:
-        """The observation (11,) that the controller is given, and the memory with the estimate.
+        """The observation (11,), and the memory with the estimate.
 
         It is of the moment at which the torque begins that the controller is about to command.
 
         Args:
             memory, measurement, context: as of :meth:`step`.
         """
-        state: Any = measurement
-        if memory is not None:
-            memory = self._estimated(memory, measurement, context)
-            state, context = memory.estimate, self.believed(memory, context)
-            if context.knowledge.delay:
-                state = belief.after_delay(state, _bodily(memory, context), context)
-        quaternion, rate = jnp.stack(state.quaternion), jnp.stack(state.angular_velocity)
-        if memory is not None and self.adapts:
-            rate = adaptation.leaned(rate, memory.estimate.torque, context)
-        rules = context.kinematic_factor, context.observes_quaternion_rate
-        return observations.observe(quaternion, rate, *rules), memory
+        if memory is None:
+            return _observation(measurement, context), None
+        memory = self._estimated(memory, measurement, context)
+        context = self.believed(memory, context)
+        return _ahead(memory.estimate, _bodily(memory, context), context), memory
 
     def _estimated(self, memory, measurement, context):
         """The memory with the estimate at this decision, and the queue seen from it."""
@@ -165,16 +181,43 @@ def _bodily(memory, context):
     return adaptation.bodily(memory.queue, memory.identity, context)
 
 
+def _ahead(estimate, queue, context):
+    """The observation of when the torque begins that is about to be commanded."""
+    if context.knowledge.delay:
+        estimate = belief.after_delay(estimate, queue, context)
+    return _observation(estimate, context)
+
+
+def _observation(state, context):
+    quaternion, rate = jnp.stack(state.quaternion), jnp.stack(state.angular_velocity)
+    rules = context.kinematic_factor, context.observes_quaternion_rate
+    return observations.observe(quaternion, rate, *rules)
+
+
 def flight_loop(
-    controller: Callable[[chex.Array, Context], Any], adapts: bool = False
+    controller: Callable[[chex.Array, Context], Any] | None,
+    *,
+    adapts: bool = False,
+    assurance: Assurance | None = None,
+    scores: Callable[[chex.Array, Context], chex.Array] | None = None,
 ) -> FlightLoop:
-    """A controller with the default estimator and predictor.
+    """A controller with the default estimator and predictor, and with an assurance if asked for.
 
     Args:
-        controller: ``act(observation (11,), context) -> action``, or a flight loop already.
+        controller: ``act(observation (11,), context) -> action``, or a flight loop already; None
+            where there are scores.
         adapts: whether the loop identifies inertia and torques in flight, and flies by them.
+        assurance: that stands after it (:func:`attjax.control.assured.assurance`).
+        scores: of all actions for it, as of :func:`attjax.control.assured.assured`.
     """
     if isinstance(controller, FlightLoop):
-        return controller.replace(adapts=adapts) if adapts else controller
-    is_tree = isinstance(controller, jax.tree_util.Partial)
-    return FlightLoop(controller if is_tree else jax.tree_util.Partial(controller), adapts)
+        loop = controller
+    else:
+        is_tree = controller is None or isinstance(controller, jax.tree_util.Partial)
+        loop = FlightLoop(controller if is_tree else jax.tree_util.Partial(controller))
+    if adapts:
+        loop = loop.replace(adapts=True)
+    if assurance is not None:
+        order = ranking(loop.controller, assurance, scores)
+        loop = loop.replace(assurance=assurance, scores=order)
+    return loop
