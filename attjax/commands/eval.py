@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from attjax import destinations, devices, errors
-from attjax.commands import evaluation_output, evaluation_subject, robustness
+from attjax.commands import assured, evaluation_output, evaluation_subject, robustness
 from attjax.commands.evaluation_subject import POLICY
 from attjax.config import command_line, fields
 from attjax.spacecraft import MOST_DURATION
@@ -64,6 +64,16 @@ def _add_who(group):
         "predictor looks ahead of known delays (the same where the world is ideal)"
     )
     group.add_argument("--bare", action="store_true", help=bare_help)
+    adaptive_help = (
+        "let the flight loop identify inertia and torques in flight, and tell the controllers what "
+        "it finds"
+    )
+    group.add_argument("--adaptive", action="store_true", help=adaptive_help)
+    assured_help = (
+        "let through only actions after which every plant that the world states keeps the rate "
+        "limit, the wheels' speeds and the cones of --keep-out; else the best that does"
+    )
+    group.add_argument("--assured", action="store_true", help=assured_help)
     actions_help = (
         "how classical controllers without checkpoint act: by one of the torques (default), or by "
         "any about the three axes at once; a policy acts as it was trained to"
@@ -88,6 +98,8 @@ def _add_conditions(group):
     )
     group.add_argument("--fleet", action="store_true", help=fleet_help)
     command_line.add_world(group, "that of the policy's training; ideal for a classical controller")
+    keep_out_help = "TOML file of cones [[keep_out]] that axes keep out of, for --assured"
+    group.add_argument("--keep-out", type=command_line.path, metavar="FILE", help=keep_out_help)
     duration_help = "length of an episode (default: the spacecraft's; LM50's is 43.75)"
     limits = {"above": 0, "high": MOST_DURATION}
     command_line.add_number(group, "duration", float, None, duration_help, unit="s", **limits)
@@ -123,7 +135,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         world = evaluation_subject.world(arguments, config)
         spacecraft = evaluation_subject.spacecraft(arguments, config, world)
         env = evaluation_subject.env(arguments, config, spacecraft, world)
-        controllers = {name: _flown(name, arguments, env, config) for name in names}
+        assurance = assured.asked_for(arguments, env)
+        how = arguments, env, config, assurance
+        controllers = {name: evaluation_subject.flown(name, *how) for name in names}
         if arguments.json not in (None, STDOUT):
             destinations.check("--json", arguments.json)
         evaluation_output.prepare_playback(
@@ -140,22 +154,24 @@ def main(argv: Sequence[str] | None = None) -> int:
         with aside:
             if arguments.robustness:
                 return robustness.judge(arguments, controllers, env, json_file)
-            return _evaluate(arguments, controllers, env, plots, metrics, json_file)
+            return _evaluate(how, controllers, plots, metrics, json_file)
 
 
-def _evaluate(arguments, controllers, env, plots, metrics, json_file):
+def _evaluate(how, controllers, plots, metrics, json_file):
     """Fly, draw, write and print."""
     # Imported late: with them, --help and errors in the arguments would take seconds.
     from attjax import evaluation
     from attjax.evaluation import tables
 
+    arguments, env, _, assurance = how
     params, seed, episodes = env.default_params, arguments.seed or 0, arguments.episodes
     judge = evaluation.evaluate_fleet if arguments.fleet else evaluation.evaluate
     start, results, written = time.monotonic(), [], []
     for name, controller in controllers.items():
         with evaluation_output.flying(name, episodes) as told:
             judged = judge(controller, env, episodes=episodes, seed=seed, progress=told)
-        results.append({"controller": name} | judged)
+        shown = f"{name}, adaptive" if arguments.adaptive else name
+        results.append({"controller": shown} | judged | assured.told(assurance))
         if plots:
             folder = arguments.plot / name if arguments.compare else arguments.plot
             flight = plots.Flight(controller, env, params, seed, episodes)
@@ -168,7 +184,7 @@ def _evaluate(arguments, controllers, env, plots, metrics, json_file):
                 json_file, {"controllers": results} if arguments.compare else results[0]
             )
         if arguments.playback:
-            _write_playback(arguments, controllers, env, params)
+            _write_playback(how, controllers)
             written.append(arguments.playback)
     finally:  # where one of them fails, too
         for path in written:
@@ -177,51 +193,21 @@ def _evaluate(arguments, controllers, env, plots, metrics, json_file):
             tables.print_comparison(results, env.spacecraft)
         else:
             tables.print_report(results[0], env.spacecraft)
+        if assurance is not None:
+            print(assured.line(assurance))
         print(f"evaluated in {seconds:.1f} s, compilation included")
     return 0
 
 
-def _write_playback(arguments, controllers, env, params):
+def _write_playback(how, controllers):
     """The controller that is judged beside phase-plane, or that beside feedback."""
     from attjax.evaluation.playback import page as playback
 
+    arguments, env, _, assurance = how
     name = next(iter(controllers))
     other = "feedback" if name == "phase-plane" else "phase-plane"
-    shown = {name: controllers[name], other: _flown(other, arguments, env, None)}
+    beside = evaluation_subject.flown(other, arguments, env, None, assurance)
+    shown = {name: controllers[name], other: beside}
     checkpoint = arguments.checkpoint.resolve().name if name == POLICY else None
-    page = playback.page(shown, env, params, arguments.seed or 0, checkpoint)
+    page = playback.page(shown, env, env.default_params, arguments.seed or 0, checkpoint)
     evaluation_output.write_text(arguments.playback, page)
-
-
-def _flown(name, arguments, env, config):
-    from attjax.control.flight_loop import flight_loop
-
-    controller = _controller(name, arguments, env, config)
-    is_plain = arguments.bare or arguments.robustness  # which flies each in both ways
-    return controller if is_plain else flight_loop(controller)
-
-
-def _controller(name, arguments, env, config):
-    import jax
-
-    from attjax.control import classical, own_units
-    from attjax.runs import checkpoint
-
-    if name != POLICY:
-        return jax.tree_util.Partial(classical.CONTROLLERS[name])
-    folder, trained_on = arguments.checkpoint, config.spacecraft
-    is_universal = config.settings.network.features == "universal"
-    if is_universal:
-        with errors.one_line_errors(ValueError):
-            own_units.check_axes(env.spacecraft)
-    is_tied = env.actions == "discrete" and not is_universal
-    if is_tied and trained_on.num_actions != env.num_actions:
-        raise errors.UserError(
-            f"{arguments.spacecraft} has {env.num_actions} actions; the policy in {folder} "
-            f"chooses among {trained_on.num_actions}"
-        )
-    update = checkpoint.best(folder) if arguments.best else None
-    if arguments.sampled:
-        policy, params = checkpoint.restore_network(folder, update)
-        return jax.tree_util.Partial(policy.draw, params, jax.random.key(arguments.seed or 0))
-    return checkpoint.restore_policy(folder, update)

@@ -1,4 +1,4 @@
-"""What ``eval.py`` is to judge: the run of the policy, the spacecraft, its world, the simulator."""
+"""What ``eval.py`` is to judge: a policy's run, a spacecraft in its world, what flies it."""
 
 import argparse
 import dataclasses
@@ -13,12 +13,15 @@ from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
 from attjax.world import IDEAL, World, made_for
 
 if TYPE_CHECKING:
+    from attjax.control.assured import Assurance
     from attjax.envs.attitude import AttitudeEnv
+    from attjax.evaluation.flown import Controller
 
 POLICY = "policy"
 NOT_WITH = {
-    "robustness": ("world", "bare", "sampled", "playback", "fleet"),
-    "fleet": ("spacecraft", "world", "plot", "playback"),
+    "robustness": ("world", "bare", "adaptive", "assured", "sampled", "playback", "fleet"),
+    "fleet": ("spacecraft", "world", "assured", "plot", "playback"),
+    "bare": ("adaptive",),
 }
 """Flags by the one that they do not go with."""
 
@@ -50,8 +53,10 @@ def complete(arguments: argparse.Namespace) -> None:
     """Fill in what depends on other flags.
 
     Raises:
-        UserError: a flag does not go with ``--robustness``.
+        UserError: flags do not go together.
     """
+    if arguments.keep_out and not arguments.assured:
+        raise errors.UserError("--keep-out is for --assured")
     if arguments.episodes is None:
         arguments.episodes = 1000 if arguments.robustness else 5000
     for ladder, flags in NOT_WITH.items():
@@ -118,9 +123,71 @@ def env(
     # Imported late: with it, --help and errors in the arguments would take seconds.
     from attjax.runs import build
 
+    if arguments.adaptive and world.wheels is not None:
+        raise errors.UserError("--adaptive: a flight loop cannot adapt to reaction wheels yet")
     with errors.one_line_errors(ValueError):
         run_config.check_world(world, spacecraft)
     rules = {"actions": arguments.actions or "discrete"}
     if config:
         rules = build.rules(config.settings.task)
     return build.environment(arguments.frameskip, spacecraft, {"world": world, **rules})
+
+
+def flown(
+    name: str,
+    arguments: argparse.Namespace,
+    env: "AttitudeEnv",
+    config: run_config.Config | None,
+    assurance: "Assurance | None",
+) -> "Controller":
+    """A controller as it is to fly: in a flight loop and under assurance, or bare.
+
+    Args:
+        name: of the controller.
+        arguments: of the command line.
+        env: that it flies.
+        config: of the policy's run.
+        assurance: that stands after it.
+
+    Raises:
+        UserError: the checkpoint cannot be read, or its policy cannot fly the spacecraft.
+    """
+    from attjax.control.assured import assured
+    from attjax.control.flight_loop import flight_loop
+    from attjax.runs import checkpoint, flight
+
+    controller, scores = _controller(name, arguments, env, config), None
+    if arguments.robustness:  # which flies each in both ways
+        return controller
+    if assurance is not None and name == POLICY and not arguments.sampled:
+        update = checkpoint.best(arguments.checkpoint) if arguments.best else None
+        scores = flight.policy_scores(arguments.checkpoint, update)
+    if arguments.bare:
+        return controller if assurance is None else assured(controller, assurance, scores)
+    return flight_loop(controller, adapts=arguments.adaptive, assurance=assurance, scores=scores)
+
+
+def _controller(name, arguments, env, config):
+    import jax
+
+    from attjax.control import classical, own_units
+    from attjax.runs import checkpoint
+
+    if name != POLICY:
+        return jax.tree_util.Partial(classical.CONTROLLERS[name])
+    folder, trained_on = arguments.checkpoint, config.spacecraft
+    is_universal = config.settings.network.features == "universal"
+    if is_universal:
+        with errors.one_line_errors(ValueError):
+            own_units.check_axes(env.spacecraft)
+    is_tied = env.actions == "discrete" and not is_universal
+    if is_tied and trained_on.num_actions != env.num_actions:
+        raise errors.UserError(
+            f"{arguments.spacecraft} has {env.num_actions} actions; the policy in {folder} "
+            f"chooses among {trained_on.num_actions}"
+        )
+    update = checkpoint.best(folder) if arguments.best else None
+    if arguments.sampled:
+        policy, params = checkpoint.restore_network(folder, update)
+        return jax.tree_util.Partial(policy.draw, params, jax.random.key(arguments.seed or 0))
+    return checkpoint.restore_policy(folder, update)

@@ -13,7 +13,7 @@ from attjax.config import fields, help_text, presets, settings
 from attjax.config.run import Config
 from attjax.errors import UserError
 from attjax.spacecraft import Spacecraft
-from attjax.world import World, names
+from attjax.world import KeepOut, World, keep_out, names
 from attjax.world.distributions import KINDS
 
 SETTINGS = settings.FIELDS
@@ -74,6 +74,16 @@ def read_world(name_or_path: str) -> World:
         )
     with _one_line(f"--world {path}"):
         return World.from_toml(path)
+
+
+def read_keep_out(path: Path) -> tuple[KeepOut, ...]:
+    """The cones of ``--keep-out``.
+
+    Raises:
+        UserError: the file cannot be read, or describes none.
+    """
+    with _one_line(f"--keep-out {path}"):
+        return keep_out.from_toml(path)
 
 
 @contextlib.contextmanager

@@ -110,19 +110,27 @@ def _moved(estimate, queue, context, step):
 
 def impulse(queue: Queue, context: Context) -> Vector:
     """What the commanded torques give in a control period, body frame, N m s."""
-    steps = rk4_steps(context)
-    pulses = queue.pulses()
-    starts = [jnp.clip(pulse.start, 0, steps) for pulse in pulses] + [steps]
-    given = []
-    for pulse, start, following in zip(pulses, starts, starts[1:]):
-        if context.agent_step.held:
-            lasting = following - start
-        else:
-            lasting = jnp.where((pulse.start >= 0) & (pulse.start < steps), 1, 0)
-        given.append(vectors.scaled(lasting * INTEGRATION_STEP, pulse.torque))
+    given = [
+        vectors.scaled(duration, pulse.torque)
+        for duration, pulse in zip(durations(queue, context), queue.pulses())
+    ]
     total = functools.reduce(vectors.add, given)
     known = context.knowledge.wheels
     return total if known is None else known.wheels.along_axes(total)
+
+
+def durations(queue: Queue, context: Context) -> list[chex.Array]:
+    """How long each of the queue's torques acts in a control period, s."""
+    steps = rk4_steps(context)
+    pulses, lasting = queue.pulses(), []
+    starts = [jnp.clip(pulse.start, 0, steps) for pulse in pulses] + [steps]
+    for pulse, start, following in zip(pulses, starts, starts[1:]):
+        if context.agent_step.held:
+            steps_on = following - start
+        else:
+            steps_on = jnp.where((pulse.start >= 0) & (pulse.start < steps), 1, 0)
+        lasting.append(steps_on * INTEGRATION_STEP)
+    return lasting
 
 
 def commanded_torque(action: chex.Numeric, context: Context) -> chex.Array:

@@ -65,7 +65,7 @@ def unknowing(context: Context) -> tuple[Estimate, Expected]:
     known, zero = context.knowledge, jnp.zeros((), context.inertia.dtype)
     still, level = (zero,) * 3, (zero, zero, zero, zero + 1)
     attitude, rate = known.attitude, known.rate
-    is_told = attitude is None and rate is None
+    is_told = known.is_told and not known.is_filtered
     estimate = Estimate(
         quaternion=level,
         angular_velocity=still,
@@ -133,7 +133,8 @@ def corrected(
         return _as_told(estimate, told)
     estimate = estimate.replace(wheel_speeds=told.wheel_speeds)
     noise = linearized.noise(context)
-    return together(measured.correct, estimate, expected, told, noise)
+    estimate = together(measured.correct, estimate, expected, told, noise)
+    return _as_told(estimate, told) if context.knowledge.is_told else estimate
 
 
 def begun(estimate: Estimate, measurement: Measurement, context: Context) -> Estimate:

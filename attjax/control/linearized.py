@@ -172,7 +172,7 @@ def _transition(estimate, motion, rate, model):
     if model.knowledge.wheels is not None:
         aboard = model.knowledge.wheels.wheels.momentum(estimate.wheel_speeds)
         momentum = vectors.add(momentum, aboard)
-    slowed = _rate_transition(momentum, rate, model)
+    slowed = rate_transition(momentum, rate, model)
     half = model.turning * period / 2
     drifted = [[half * (turned[i][j] + slowed[i][j]) for j in AXES] for i in AXES]
     nothing: list[Any] = [None] * 3
@@ -189,8 +189,14 @@ def _transition(estimate, motion, rate, model):
     return rows
 
 
-def _rate_transition(momentum, rate, model):
-    """exp(A Δt) to second order, where A = I⁻¹ (h× − ω× I) with the momentum h, by Eq. 6."""
+def rate_transition(momentum: Vector, rate: Vector, model: Model) -> list[list[Any]]:
+    """exp(A Δt) to second order, where A = I⁻¹ (h× − ω× I) with the momentum h, by Eq. 6.
+
+    Args:
+        momentum: h, N m s.
+        rate: ω, rad/s.
+        model: of the period.
+    """
     spun = [[product(row, column) for column in zip(*_rows(model.inertia))] for row in _skew(rate)]
     gyroscopic = [
         [_sum(x, _times(-1, y)) for x, y in zip(*rows)] for rows in zip(_skew(momentum), spun)

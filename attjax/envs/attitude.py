@@ -107,7 +107,8 @@ class AttitudeEnv:
     def context(self, params: EnvParams) -> Context:
         """What a controller may know of this environment."""
         agent_step = AgentStep(self.frameskip, params.torque_held, self.kinematic_factor)
-        told = self.observes_quaternion_rate, self._is_continuous
+        count = 3 if self._is_continuous else len(self.spacecraft.torque_axes)
+        told = self.observes_quaternion_rate, self._is_continuous, count
         axes = (
             worlds.torque_axes(params, self.spacecraft, self.actions) if self.world.wheels else None
         )

@@ -28,6 +28,7 @@ class Context:
         observes_quaternion_rate: whether Eq. 11's q̇ is observed; a Python bool.
         continuous: whether an action is (3,) fractions of the largest torque about each body axis
             instead of a row of the table; a Python bool.
+        torque_axes: how many there are that the table's torques are along, in Table 1's order.
     """
 
     control_period: chex.Array
@@ -40,6 +41,7 @@ class Context:
     agent_step: AgentStep = struct.field(pytree_node=False, default=AgentStep(0))
     observes_quaternion_rate: bool = struct.field(pytree_node=False, default=True)
     continuous: bool = struct.field(pytree_node=False, default=False)
+    torque_axes: int = struct.field(pytree_node=False, default=3)
 
     @property
     def kinematic_factor(self) -> float:
@@ -62,7 +64,7 @@ def believed(
     world: World,
     agent_step: AgentStep,
     axes: chex.Array | None,
-    told: tuple[bool, bool],
+    told: tuple[bool, bool, int],
 ) -> Context:
     """The context of a spacecraft in a world.
 
@@ -71,7 +73,8 @@ def believed(
         world: that it flies in.
         agent_step: as of :class:`Context`.
         axes: (axes, 3) unit vectors of the torque axes, body frame, where they have wheels.
-        told: ``observes_quaternion_rate`` and ``continuous``, as of :class:`Context`.
+        told: ``observes_quaternion_rate``, ``continuous`` and ``torque_axes``, as of
+            :class:`Context`.
     """
     period = control_period(params, agent_step.frameskip)
     return Context(
@@ -85,4 +88,5 @@ def believed(
         agent_step=agent_step,
         observes_quaternion_rate=told[0],
         continuous=told[1],
+        torque_axes=told[2],
     )

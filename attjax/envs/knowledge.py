@@ -13,6 +13,7 @@ from flax import struct
 from attjax.dynamics.clock import Clock
 from attjax.dynamics.moving_parts import Motors, Wheels
 from attjax.dynamics.vectors import Vector
+from attjax.envs.doubt import Doubt, deviation_from_one, doubt
 from attjax.envs.sensors import ALLAN_TOP, ARCSEC, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, PPM, clock_of
 from attjax.envs.torque_noise import TorqueNoise, torque_noise
 from attjax.spacecraft import INTEGRATION_STEP
@@ -87,7 +88,9 @@ class Knowledge(struct.PyTreeNode):
         along, across: standard deviations of a torque, as shares of it.
         inertia: of a moment of inertia, as a share of it.
         wheels: None: it has none.
+        doubt: of inertia and torque axes, effect by effect.
         delay: from a command to its torque, RK4 steps; known when it is compiled.
+        is_filtered: whether what is told is filtered even where it is the truth.
     """
 
     attitude: AttitudeNoise | None = None
@@ -97,18 +100,27 @@ class Knowledge(struct.PyTreeNode):
     across: chex.Numeric = 0.0
     inertia: chex.Numeric = 0.0
     wheels: KnownWheels | None = None
+    doubt: Doubt = Doubt()
     delay: int = struct.field(pytree_node=False, default=0)
+    is_filtered: bool = struct.field(pytree_node=False, default=False)
 
     @property
     def is_truth(self) -> bool:
         """Whether there is nothing to estimate: the truth is told, and torques come at once."""
-        return self.attitude is None and self.rate is None and self.delay == 0
+        return self.is_told and self.delay == 0 and not self.is_filtered
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the sensors say the truth."""
+        return self.attitude is None and self.rate is None
 
 
 def knowledge(
     world: World, inertia: chex.Array, period: chex.Numeric, axes: chex.Array | None = None
 ) -> Knowledge:
-    """What is known of a world; nothing of one where the truth is told and torques come at once.
+    """What is known of a world.
+
+    Where the truth is told and torques come at once, it is what can be wrong of the spacecraft.
 
     Args:
         world: its description.
@@ -126,18 +138,21 @@ def knowledge(
     sensors = world.sensors
     tracker, gyro = (sensors.star_tracker, sensors.gyro) if sensors else (None, None)
     delay = _delay(world.actuators)
+    torque, wrong = torque_noise(world, inertia, period), doubt(world)
+    wheels = _wheels(world.wheels, axes)
     if tracker is None and gyro is None and delay == 0:
-        return Knowledge()
+        return Knowledge(torque=torque, wheels=wheels, doubt=wrong)
     inertia_error = _inertia_error(world.uncertainty)
     along, across = _torque_errors(world.actuators)
     return Knowledge(
         attitude=None if tracker is None else _attitude_noise(tracker),
         rate=None if gyro is None else _rate_noise(gyro, period),
-        torque=torque_noise(world, inertia, period),
+        torque=torque,
         along=math.hypot(along, inertia_error),
         across=across,
         inertia=inertia_error,
-        wheels=_wheels(world.wheels, axes),
+        wheels=wheels,
+        doubt=wrong,
         delay=delay,
     )
 
@@ -159,11 +174,6 @@ def _wheels(given, axes):
     return KnownWheels(wheels, Motors(ones, given.most_torque, band or None))
 
 
-def _deviation_from_one(number):
-    mean, square = moments(number)
-    return math.sqrt(max(square - 2 * mean + 1, 0))
-
-
 def _delay(actuators):
     if actuators is None:
         return 0
@@ -174,7 +184,7 @@ def _torque_errors(actuators):
     if actuators is None:
         return 0.0, 0.0
     angle = math.radians(root_mean_square(actuators.misalignment_deg))
-    return _deviation_from_one(actuators.gain), angle / 2**0.5
+    return deviation_from_one(actuators.gain), angle / 2**0.5
 
 
 def _inertia_error(uncertainty):
@@ -182,7 +192,7 @@ def _inertia_error(uncertainty):
         return 0.0
     factors = uncertainty.inertia_factor, uncertainty.moment_factor
     turned = math.radians(root_mean_square(uncertainty.axes_turned_deg))
-    return math.hypot(*map(_deviation_from_one, factors), min(turned, 1))
+    return math.hypot(*map(deviation_from_one, factors), min(turned, 1))
 
 
 def _attitude_noise(tracker):

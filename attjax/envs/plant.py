@@ -3,7 +3,7 @@
 A controller, and all that judges it, believes in :class:`attjax.EnvParams`; what moves is this.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import chex
 import jax
@@ -26,6 +26,18 @@ from attjax.dynamics.sensing import Seen, Sensing
 from attjax.spacecraft import INTEGRATION_STEP
 
 
+class Change(NamedTuple):
+    """What becomes of the inertia at a moment.
+
+    Attributes:
+        factor: of it from then on.
+        time: s after the start of the episode.
+    """
+
+    factor: chex.Array
+    time: chex.Array
+
+
 class Plant(struct.PyTreeNode):
     """One spacecraft in its world, in one episode.
 
@@ -40,6 +52,7 @@ class Plant(struct.PyTreeNode):
         sensing: sensors and what they say; None: the truth is told.
         wheels, wheel_speeds: reaction wheels, and (axes,) their speeds against the body, rad/s.
         flexible, deflection: an appendage's mode, and (2,) its η and η̇.
+        change: of the inertia; None: there is none.
     """
 
     key: chex.Array
@@ -56,6 +69,13 @@ class Plant(struct.PyTreeNode):
     wheel_speeds: chex.Array | None = None
     flexible: FlexibleMode | None = None
     deflection: chex.Array | None = None
+    change: Change | None = None
+
+    def inertia_at(self, time: chex.Numeric) -> chex.Array:
+        """The inertia so many seconds after the start of the episode."""
+        if self.change is None:
+            return self.inertia
+        return jnp.where(time >= self.change.time, self.change.factor, 1) * self.inertia
 
     def moved(
         self,
@@ -112,7 +132,7 @@ class Plant(struct.PyTreeNode):
         return tuple(x if x is None else tuple(x) for x in (self.wheel_speeds, self.deflection))
 
     def _equations(self, agent_step, middle):
-        body = body_of(self.inertia, self.wheels, self.flexible)
+        body = body_of(self.inertia_at(middle), self.wheels, self.flexible)
         swinging = self.disturbances.swinging
         return ForcedEquations(
             pulses=self.queue.pulses(),

@@ -27,7 +27,7 @@ from attjax.envs.inertia import drawn_inertia
 from attjax.envs.keys import world_key
 from attjax.envs.moving_parts import drawn_flexible, drawn_motors, drawn_wheels
 from attjax.envs.parameters import EnvParams, EnvState, control_period
-from attjax.envs.plant import Plant
+from attjax.envs.plant import Change, Plant
 from attjax.envs.sensors import drawn_sensing
 from attjax.envs.torques import torque_axes
 from attjax.world import World
@@ -66,8 +66,7 @@ def drawn_plant(
         axes: (axes, 3) unit vectors of the torque axes, body frame, as believed.
         frameskip: RK4 steps after the first in an agent step, where all spacecraft have the same.
     """
-    dtype = params.inertia.dtype
-    draws = Draws(key, dtype)
+    draws = Draws(key, params.inertia.dtype)
     start = Seen(state.quaternion, state.angular_velocity)
     inertia = drawn_inertia(world.uncertainty, draws, params.inertia)
     orbit = _orbit(world, draws)
@@ -81,7 +80,7 @@ def drawn_plant(
         key=jax.random.key_data(draws.key),
         inertia=inertia,
         actuators=_actuators(world, draws, gains, directions),
-        queue=empty_queue(most_delay, least_steps, params.torque_held, dtype, size),
+        queue=empty_queue(most_delay, least_steps, params.torque_held, draws.dtype, size),
         orbit=None if orbit is None else orbit[0],
         disturbances=_disturbances(world, draws, inertia, orbit),
         own_disturbances=tuple(x.drawn(draws) for x in world.own_disturbances),
@@ -92,7 +91,15 @@ def drawn_plant(
         wheel_speeds=wheel_speeds,
         flexible=flexible,
         deflection=deflection,
+        change=_change(world.uncertainty, draws),
     )
+
+
+def _change(given, draws):
+    if given is None or given.change_factor == 1:
+        return None
+    names = "change_factor", "change_time"
+    return Change(*(draws.number(name, getattr(given, name)) for name in names))
 
 
 def _orbit(world, draws):

@@ -49,13 +49,18 @@ class Flown(NamedTuple):
 
 
 def first_memory(controllers: Crew, of: Flown, slews: int) -> Memory | None:
-    """Before the first decision, of so many slews a loop; None where nothing is remembered."""
+    """Before the first decision, of so many slews a loop; None where nothing is remembered.
+
+    Raises:
+        ValueError: of flight loops side by side, one adapts and another does not.
+    """
     loops = _loops(controllers)
     if not loops:
         return None
-    context = of.env.context(parameters.of_fleet(of.params, 0))
-    memory, count = loops[0].init(context), slews * len(loops)
-    return jax.tree.map(lambda x: jnp.broadcast_to(x, (count, *jnp.shape(x))), memory)
+    if len({loop.adapts for loop in loops}) > 1:
+        raise ValueError("of flight loops side by side all adapt, or none")
+    rows = slice(0, slews * len(loops))
+    return of.each(lambda _, context: loops[0].init(context), rows, jnp.arange(rows.stop))
 
 
 def _loops(controllers):
@@ -80,9 +85,15 @@ def decide(
         measurements = jax.vmap(measured)(jax.tree.map(lambda x: x[looped], states))
         observed, memory = of.each(loops[0].observed, looped, memory, measurements)
         told = jnp.concatenate([observed, told[looped.stop :]])
-    acting = [x.controller if isinstance(x, FlightLoop) else x for x in controllers]
-    rows = [slice(n * count, (n + 1) * count) for n in range(len(acting))]
-    action = jnp.concatenate([of.each(act, part, told[part]) for act, part in zip(acting, rows)])
+    actions = []
+    for n, controller in enumerate(controllers):
+        rows = slice(n * count, (n + 1) * count)
+        if isinstance(controller, FlightLoop):
+            own = jax.tree.map(lambda x, rows=rows: x[rows], memory)
+            actions.append(of.each(controller.act, rows, own, told[rows]))
+        else:
+            actions.append(of.each(controller, rows, told[rows]))
+    action = jnp.concatenate(actions)
     if loops:
         memory = of.each(loops[0].after, looped, memory, action[looped])
     return action, memory

@@ -196,6 +196,18 @@ class Policy:
         decided = self._decided(params, self.encode(observation, context), noise)
         return self.command(decided, context)
 
+    def scores(self, params: dict, observation: chex.Array, context: Context) -> chex.Array:
+        """(rows of the torque table,) logits of one observation, MASKED_LOGIT where masked.
+
+        Less where the row is none of those that the policy chooses from.
+        """
+        outputs = _one_of_a_batch(lambda params, inputs: self.outputs(params, inputs).T)
+        logits = outputs(params, self.encode(observation, context))
+        if not self._is_universal:
+            return logits
+        lowest = jnp.full(len(context.torque_table), 2 * MASKED_LOGIT, logits.dtype)
+        return lowest.at[own_units.rows(context)].max(logits)
+
     def _decided(self, params, inputs, noise):
         """The action for one spacecraft's inputs: drawn, or the mode where there is no noise."""
 

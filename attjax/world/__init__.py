@@ -6,6 +6,7 @@ This package imports nothing heavy, so that errors in a description are instant.
 from attjax.world.aboard import Actuators, Uncertainty
 from attjax.world.description import IDEAL, World, made_for, names
 from attjax.world.distributions import LogUniform, Normal, Uniform
+from attjax.world.keep_out import KeepOut
 from attjax.world.moving import Flexible, Wheels, check_moving
 from attjax.world.outside import Disturbances, Drag, Orbit, RadiationPressure, Sinusoid
 from attjax.world.telling import Gyro, Sensors, StarTracker
@@ -17,6 +18,7 @@ __all__ = [
     "Drag",
     "Flexible",
     "Gyro",
+    "KeepOut",
     "LogUniform",
     "Normal",
     "Orbit",

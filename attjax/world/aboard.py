@@ -20,16 +20,22 @@ class Uncertainty(Part):
             together is cut to their sum.
         axes_turned_deg: angle of the principal axes from those believed, about an axis that is
             drawn uniformly.
+        change_factor: of the inertia from ``change_time`` on, as by what docks or is let go, whose
+            rate is the same; nothing of it is known to the controller.
+        change_time: s after the start.
     """
 
     inertia_factor: Annotated[Number, Range(0.05, 20)] = 1.0
     moment_factor: Annotated[Number, Range(0.05, 20)] = 1.0
     axes_turned_deg: Annotated[Number, Range(0, 180)] = 0.0
+    change_factor: Annotated[Number, Range(0.05, 20)] = 1.0
+    change_time: Annotated[Number, Range(0, 1e6)] = 0.0
 
     @property
     def least_factor(self) -> float:
         """The least that the least moment can be multiplied by; a cut leaves it as it is."""
-        return least(self.inertia_factor) * least(self.moment_factor)
+        change = min(1.0, least(self.change_factor))
+        return least(self.inertia_factor) * least(self.moment_factor) * change
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -237,6 +237,25 @@ def test_features_of_a_large_batch_are_those_of_small_ones():
     assert np.sum(differing) <= 2  # at the very limit
 
 
+def test_scores_are_of_the_rows_of_the_table_and_the_best_is_what_is_done():
+    """For an assurance, of any number of levels; what is none of its actions is the last choice."""
+    policy = Policy("universal", (8,), own_units.ACTIONS, 0.99)
+    crafts = LM50, SKEW, Spacecraft(torque_levels=(0.3, 0.001, 0.2, 0.02, 0.002), inertia=TENSOR)
+    rng = np.random.default_rng(0)
+    for craft in (*crafts, Spacecraft(torque_levels=(0.4,))):
+        context = context_of(craft)
+        keys = jax.random.split(jax.random.key(0))
+        params = policy.init(*keys, jnp.zeros(11).at[3].set(1), context)
+        params = jax.tree.map(lambda x: x + jnp.asarray(rng.normal(size=x.shape), x.dtype), params)
+        for rate in rng.normal(0, 0.1, (20, 3)):
+            told = observation.observe(jnp.asarray(rng.normal(size=4) / 2), jnp.asarray(rate))
+            scores = policy.scores(params, told, context)
+            assert scores.shape == (len(context.torque_table),)
+            assert int(jnp.argmax(scores)) == int(policy.act(params, told, context))
+        others = np.setdiff1d(np.arange(len(scores)), own_units.rows(context))
+        assert np.all(np.isfinite(scores)) and np.all(scores[others] < -1.5e9)
+
+
 def test_an_export_is_of_torques_in_order():
     env = AttitudeEnv(5)
     policy = Policy("universal", (8,), own_units.ACTIONS, 0.99)

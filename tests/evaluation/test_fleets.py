@@ -11,8 +11,10 @@ from commands import eval_script, one_line_error
 from attjax import AttitudeEnv, Spacecraft, World, evaluation, flight_loop
 from attjax.control.classical import phase_plane, quaternion_feedback
 from attjax.control.time_optimal import rate_limited_reference, time_optimal_reference
+from attjax.envs import parameters
 from attjax.evaluation import fleets
 from attjax.evaluation.episodes import fly_side_by_side
+from attjax.evaluation.flown import Flown, first_memory
 
 SHORT = AttitudeEnv(20, spacecraft=Spacecraft(duration=6))
 
@@ -110,9 +112,26 @@ def test_the_command_flies_a_fleet(tmp_path, capsys):
     printed, told = capsys.readouterr().out, json.loads(file.read_text())
     assert "any spacecraft, seed 0" in printed and "beside estimates  settling" in printed
     assert told["spacecraft"] == "any" and told["settling_over_estimate"] > 0.9
-    for flag in ("--spacecraft=a.toml", "--world=stress", "--plot=x", "--playback=x.html"):
+    others = "--spacecraft=a.toml", "--world=stress", "--assured", "--plot=x", "--playback=x.html"
+    for flag in others:
         said = one_line_error(eval_script.main, ["--controller=feedback", "--fleet", flag], capsys)
         assert f"{flag.partition('=')[0]} does not go with --fleet" in said
+
+
+def test_a_loop_that_adapts_begins_with_each_spacecraft_as_believed():
+    params, count = fleets.params_of(SHORT, 5, seed=1), 5
+    loops = (flight_loop(phase_plane, adapts=True),) * 2
+    doubled = jax.tree.map(
+        lambda x, axis: x if axis is None else jnp.concatenate([x] * 2),
+        params,
+        parameters.fleet_axes(params),
+    )
+    memory = first_memory(loops, Flown(SHORT, doubled), count)
+    found = np.stack([np.stack(x, axis=-1) for x in memory.identity.inertia], axis=1)
+    np.testing.assert_allclose(found, doubled.inertia, rtol=1e-4, atol=1e-5)
+    mixed = loops[0], flight_loop(phase_plane)
+    with pytest.raises(ValueError, match="of flight loops side by side all adapt, or none"):
+        first_memory(mixed, Flown(SHORT, params), count)
 
 
 def test_a_fleet_in_another_world_is_refused():

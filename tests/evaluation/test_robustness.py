@@ -128,7 +128,15 @@ def test_the_command_prints_draws_and_writes(two_conditions, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    "flags", [["--world", "stress"], ["--bare"], ["--sampled"], ["--playback", "page.html"]]
+    "flags",
+    [
+        ["--world", "stress"],
+        ["--bare"],
+        ["--adaptive"],
+        ["--assured"],
+        ["--sampled"],
+        ["--playback", "page.html"],
+    ],
 )
 def test_flags_that_do_not_go_with_it_are_refused(flags, capsys):
     with pytest.raises(SystemExit) as stopped:

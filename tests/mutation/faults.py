@@ -1,5 +1,6 @@
 """Deliberate faults that no rule of mutants.py makes, each with the tests that should see it."""
 
+from assurance_faults import ASSURANCE_FAULTS
 from loop_faults import LOOP_FAULTS
 from world_faults import WORLD_FAULTS
 
@@ -197,5 +198,5 @@ FAULTS = {
     "no lock on the folder": (
         "attjax/runs/folder.py", "fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,
     ),
-} | WORLD_FAULTS | LOOP_FAULTS  # fmt: skip
+} | WORLD_FAULTS | LOOP_FAULTS | ASSURANCE_FAULTS  # fmt: skip
 """By name: module, code, what it becomes, tests that should catch it."""

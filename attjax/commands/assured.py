@@ -1,0 +1,52 @@
+"""``eval.py --assured``: controllers under run-time assurance."""
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from attjax import errors
+from attjax.config import toml
+
+if TYPE_CHECKING:
+    from attjax.control.assured import Assurance
+    from attjax.envs.attitude import AttitudeEnv
+
+
+def asked_for(arguments: argparse.Namespace, env: "AttitudeEnv") -> "Assurance | None":
+    """The assurance that was asked for; None where there is none.
+
+    Args:
+        arguments: of the command line.
+        env: what flies.
+
+    Raises:
+        UserError: its cones cannot be read.
+    """
+    if not arguments.assured:
+        return None
+    from attjax.control import assured
+
+    keep_out = toml.read_keep_out(arguments.keep_out) if arguments.keep_out else ()
+    with errors.one_line_errors(ValueError):
+        assurance = assured.assurance(env, keep_out)
+    if not assurance.is_certain:
+        errors.warning_line(
+            "nothing is proved of this world: what acts on the spacecraft in it can be stronger "
+            "than the torques that are certain"
+        )
+    return assurance
+
+
+def told(assurance: "Assurance | None") -> dict[str, Any]:
+    """What the results say of it."""
+    if assurance is None:
+        return {}
+    cones = 0 if assurance.cones is None else len(assurance.cones.axes)
+    return {"assured": bool(assurance.is_certain), "keep_out": cones}
+
+
+def line(assurance: "Assurance") -> str:
+    """What the report says of it."""
+    cones = told(assurance)["keep_out"]
+    limits = f"limits and {cones} cone{'s' * (cones > 1)}" if cones else "limits"
+    how = "for every plant that the world states" if assurance.is_certain else "as well as it can"
+    return f"assured: {limits}, {how}"
