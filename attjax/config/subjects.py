@@ -52,6 +52,11 @@ class Task(Checked):
         "train on spacecraft of every kind, drawn anew every 32 updates, not on the run's own",
         before=False,
     )
+    in_flight_loop: bool = _task(
+        "learn on what a flight loop's estimator believes, as it will fly; otherwise on what is "
+        "measured. In the ideal world they are the same",
+        before=False,
+    )
     kinematic_factor: float = _task(
         "factor of Eq. 9, 0.5; 1 in the authors' public code, where attitude turns twice as fast",
         above=0,

@@ -30,6 +30,7 @@ class Memory(struct.PyTreeNode):
         expected: of sensors that sample between decisions.
         queue: of the torques that were commanded.
         time: decisions so far, int32.
+        has_begun: whether one of them was here.
         identity: of the spacecraft; None: it is taken to be as believed.
     """
 
@@ -37,6 +38,7 @@ class Memory(struct.PyTreeNode):
     expected: Expected
     queue: Queue
     time: chex.Array
+    has_begun: chex.Array
     identity: Identity | None = None
 
 
@@ -78,7 +80,8 @@ class FlightLoop(struct.PyTreeNode):
         size = response.valves_of(context) if self.adapts else size
         queue = empty_queue(known.delay, least_steps, held, dtype, size)
         identity = response.unknowing(context) if self.adapts else None
-        return Memory(*estimator.unknowing(context), queue, jnp.zeros((), jnp.int32), identity)
+        new = jnp.zeros((), jnp.int32), jnp.zeros((), bool)
+        return Memory(*estimator.unknowing(context), queue, *new, identity)
 
     def step(
         self, memory: Memory | None, measurement: Measurement, context: Context
@@ -136,31 +139,50 @@ class FlightLoop(struct.PyTreeNode):
         """
         if memory is None:
             return _observation(measurement, context), None
-        memory = self._estimated(memory, measurement, context)
+        started = self._begun(memory, measurement, context)
+        following = self._estimated(memory, measurement, context)
+        return self._shown(vectors.chosen(memory.has_begun, following, started), context)
+
+    def begun(self, measurement: Measurement, context: Context) -> tuple[chex.Array, Memory | None]:
+        """As :meth:`observed`, at the first decision."""
+        memory = self.init(context)
+        if memory is None:
+            return _observation(measurement, context), None
+        return self._shown(self._begun(memory, measurement, context), context)
+
+    def later(
+        self, memory: Memory | None, measurement: Measurement, context: Context
+    ) -> tuple[chex.Array, Memory | None]:
+        """As :meth:`observed`, at any other decision."""
+        if memory is None:
+            return _observation(measurement, context), None
+        return self._shown(self._estimated(memory, measurement, context), context)
+
+    def _shown(self, memory, context):
         context = self.believed(memory, context)
         return _ahead(memory.estimate, _bodily(memory, context), context), memory
 
+    def _begun(self, memory, measurement, context):
+        """The memory with the estimate at the first decision."""
+        context = self.believed(memory, context)
+        first, identity = estimator.begun(memory.estimate, measurement, context), memory.identity
+        if identity is not None:
+            identity = adaptation.begun(identity, first)
+        return memory.replace(estimate=first, identity=identity)
+
     def _estimated(self, memory, measurement, context):
-        """The memory with the estimate at this decision, and the queue seen from it."""
+        """The memory with the estimate at any other decision, and the queue seen from it."""
         last, context = memory.time - 1, self.believed(memory, context)
         before, queue = (memory.estimate, memory.expected), _bodily(memory, context)
         predicted, expected = estimator.predicted(*before, queue, last, context)
-        first, identity = estimator.begun(memory.estimate, measurement, context), memory.identity
+        identity = memory.identity
         if identity is not None:
-            told = estimator.told_by(measurement, context)
-            seen = memory.estimate, predicted, expected, told
-            begun = adaptation.begun(identity, first)
+            seen = memory.estimate, predicted, expected, estimator.told_by(measurement, context)
             identity, predicted = adaptation.identified(identity, memory.queue, seen, context)
-        estimate = estimator.corrected(predicted, expected, measurement, context)
-        has_begun = memory.time > 0
-        if identity is not None:
-            identity = vectors.chosen(has_begun, identity, begun)
-        queue = memory.queue
-        queue = vectors.chosen(has_begun, queue.later(belief.rk4_steps(context)), queue)
         return memory.replace(
-            estimate=vectors.chosen(has_begun, estimate, first),
-            expected=vectors.chosen(has_begun, expected, memory.expected),
-            queue=queue,
+            estimate=estimator.corrected(predicted, expected, measurement, context),
+            expected=expected,
+            queue=memory.queue.later(belief.rk4_steps(context)),
             identity=identity,
         )
 
@@ -171,7 +193,7 @@ class FlightLoop(struct.PyTreeNode):
         command = belief.commanded_torque if memory.identity is None else adaptation.commanded
         torque = command(action, context)
         queue = memory.queue.and_then(context.knowledge.delay, torque)
-        return memory.replace(queue=queue, time=memory.time + 1)
+        return memory.replace(queue=queue, time=memory.time + 1, has_begun=jnp.ones((), bool))
 
 
 def _bodily(memory, context):

@@ -14,6 +14,7 @@ from attjax.config.run import Config
 from attjax.config.settings import Settings, Task
 from attjax.control import assurance, own_units
 from attjax.control.features import FEATURES
+from attjax.control.looped import LoopedEnv
 from attjax.envs import fleet, initial_state, parameters
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.reward import REWARDS
@@ -96,7 +97,7 @@ def setup(
             those of the spacecraft, or as :func:`environment` and :func:`policy`.
     """
     if settings.task.any_spacecraft:
-        _check_fleet(settings, craft, world)
+        _check_fleet(settings, craft)
     reward = REWARDS.get(settings.task.reward) or user_functions.resolve(settings.task.reward)
     start = initial_state.initial_state
     if settings.task.near_goal_share > 0:
@@ -105,7 +106,7 @@ def setup(
         )
     frameskip = max(settings.task.frameskips)
     given = {"reward": reward, "initial_state": start, "world": world, **rules(settings.task)}
-    env = environment(frameskip, craft, given)
+    env: Any = environment(frameskip, craft, given)
     if settings.task.reward not in REWARDS:
         first_reward = functools.partial(_first_reward, env)
         user_functions.check(
@@ -113,6 +114,8 @@ def setup(
         )
     if settings.network.rate_margin > 0 and settings.task.actions == "discrete":
         _check_that_torques_are_left(settings, craft)
+    if settings.task.in_flight_loop and not world.is_ideal:
+        env = LoopedEnv(env)
     groups = len(settings.task.frameskips)
     return train_state.Setup(env, policy(settings, craft), settings, groups, num_devices)
 
@@ -127,7 +130,7 @@ def of_config(config: Config) -> train_state.Setup:
     return setup(config.settings, config.spacecraft, devices, config.world)
 
 
-def _check_fleet(settings, craft, world):
+def _check_fleet(settings, craft):
     """Spacecraft of a fleet have the paper's kind of actions, and nothing else is wrong."""
     if settings.task.actions != "discrete":
         raise UserValueError(f"any_spacecraft is for discrete actions, not {settings.task.actions}")
@@ -137,8 +140,6 @@ def _check_fleet(settings, craft, world):
             f"any_spacecraft draws spacecraft with {LM50.num_actions} actions, pulses; {craft}, "
             f"whose episodes they fly, has {kind}"
         )
-    if not world.is_ideal:
-        raise UserValueError(f"any_spacecraft is for the ideal world, not {world}")
 
 
 def _check_that_torques_are_left(settings, craft):

@@ -30,7 +30,7 @@ try:
 except ImportError:  # Windows, where runs are not kept apart
     fcntl = None
 
-FORMAT = 10
+FORMAT = 11
 CONFIG, METRICS = belongings.CONFIG, belongings.METRICS
 LOST = "lost+found"
 
@@ -196,7 +196,7 @@ def read_config(folder: Path) -> Config:
 
 
 def _upgraded(content):
-    """Format 9 had fewer settings, 7 still fewer, and 5 had them in one table; up to format 8 there
+    """Formats 10, 9 and 7 had ever fewer settings, and 5 had them in one table; up to 8 there
     was the ideal world only.
     """
     version, given = content["format"], content["settings"]
