@@ -11,6 +11,7 @@ from attjax.ppo import train_state
 from attjax.runs import build
 from attjax.runs.keeper import Place
 from attjax.spacecraft import Spacecraft
+from attjax.world import Actuators, Sensors, StarTracker, Uniform, World
 
 SMALL = {
     "frameskips": (1, 3), "num_envs": 8, "rollout_length": 2, "minibatch_size": 8, "passes": 1,
@@ -51,15 +52,36 @@ def test_blocks_end_where_a_fleet_does():
     np.testing.assert_array_equal(run.env_params.inertia, expected.inertia)
 
 
-@pytest.mark.parametrize("stop_after", [30, 32, 36])
-def test_a_run_that_stopped_goes_on_the_same(tmp_path, stop_after):
-    whole = trained(total_steps=8 * 2 * 42)
-    trained(tmp_path, stop_after, total_steps=8 * 2 * 42)
+NOISY = World(
+    sensors=Sensors(star_tracker=StarTracker(cross_boresight_arcsec=5, roll_arcsec=5)),
+    actuators=Actuators(gain=Uniform(0.9, 1.1)),
+)
+LOOPED = {"world": NOISY, "in_flight_loop": True}
+
+
+@pytest.mark.parametrize(("stop_after", "values"), [(30, {}), (32, {}), (36, {}), (33, LOOPED)])
+def test_a_run_that_stopped_goes_on_the_same(tmp_path, stop_after, values):
+    """Its flight loops, too, remember what they did."""
+    whole = trained(total_steps=8 * 2 * 42, **values)
+    trained(tmp_path, stop_after, total_steps=8 * 2 * 42, **values)
     resumed = attjax.train(folder=Place(folder=tmp_path, resume=True))
     for a, b in zip(*map(jax.tree.leaves, (whole.learner.params, resumed.learner.params))):
         np.testing.assert_array_equal(a, b)
-    np.testing.assert_array_equal(whole.learner.states.time, resumed.learner.states.time)
+    for a, b in zip(*map(jax.tree.leaves, (whole.learner.states, resumed.learner.states))):
+        np.testing.assert_array_equal(a, b)
     np.testing.assert_array_equal(whole.env_params.inertia, resumed.env_params.inertia)
+
+
+def test_a_learner_in_a_flight_loop_sees_what_that_believes():
+    """And the flight loop believes each spacecraft of a fleet to be itself."""
+    run = trained(stop_after=5, **LOOPED)
+    states, observation = run.learner.states, np.asarray(run.learner.observation)
+    believed = np.stack(states.memory.estimate.quaternion, axis=1)
+    np.testing.assert_array_equal(observation[:, :4], believed)
+    error = np.abs(believed - np.asarray(states.quaternion))
+    assert 0 < error.max() < 1e-4
+    bare = trained(stop_after=5, world=NOISY)
+    assert not hasattr(bare.learner.states, "memory")
 
 
 def test_all_start_anew_with_a_fleet():
@@ -83,7 +105,6 @@ def test_all_start_anew_with_a_fleet():
             {"actions": "continuous", "any_spacecraft": False},
             "universal features are for discrete actions",
         ),
-        ({"world": "stress"}, "any_spacecraft is for the ideal world, not stress"),
         ({"spacecraft": Spacecraft(torque_held=True)}, "LM50, whose episodes they fly, has held"),
         (
             {"spacecraft": Spacecraft(torque_levels=(0.1,))},
