@@ -125,7 +125,7 @@ def assurance(env: "AttitudeEnv", keep_out: Sequence[KeepOut] = ()) -> Assurance
         >>> from attjax import AttitudeEnv
         >>> assured = assurance(AttitudeEnv(frameskip=5))
         >>> level = jnp.array([0.0, 0.0, 0.0, 1.0])
-        >>> fast = assured.admissible(level, jnp.array([0.0, 0.4999, 0.0]))
+        >>> fast = assured.admissible(level, jnp.array([0.0, 0.4994, 0.0]))
         >>> bool(assured.is_certain), int(fast.sum()), bool(fast[3])
         (True, 16, False)
     """

@@ -80,12 +80,13 @@ def test_it_is_told_the_rate_as_it_is_not_leaned():
 
 
 def test_it_looks_across_a_delay_as_was_believed_before_the_flight():
-    """Torques under way count as much as then, whatever has been identified of them."""
-    env = AttitudeEnv(5, world=world(actuators={"gain": {"uniform": [0.9, 1.1]}, "delay": 6}))
+    """Torques under way count as much as then, whatever has been identified; and no others."""
+    late, pushed = {"gain": {"uniform": [0.9, 1.1]}, "delay": 6}, {"constant_torque": 0.001}
+    env = AttitudeEnv(5, world=world(actuators=late, disturbances=pushed))
     memory, _, context = begun(env)
     rate = tuple(jnp.array([0.0, 0.49, 0.0]))
     level = tuple(jnp.array([0.0, 0.0, 0.0, 1.0]))
-    estimate = memory.estimate.replace(quaternion=level, angular_velocity=rate)
+    estimate = memory.estimate.replace(quaternion=level, angular_velocity=rate, torque=level[1:])
     down = adaptation.commanded(4, context)
     queue = memory.queue.replace(torques=0 * memory.queue.torques)
     queue = queue.and_then(0, down)

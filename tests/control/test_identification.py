@@ -11,6 +11,7 @@ from worlds import world
 from attjax import AttitudeEnv, Spacecraft, flight_loop
 from attjax.control import adaptation, belief, linearized, response
 from attjax.control.response import PAIRS, Period
+from attjax.envs import observation as observations
 from attjax.envs.parameters import measured
 
 TENSOR = ((0.9, 0.02, 0.01), (0.02, 0.5, -0.03), (0.01, -0.03, 0.8))
@@ -183,14 +184,16 @@ def test_a_constant_torque_is_leaned_against():
     """Shown N d T, a controller asks for −d T; a held one for as much all the time."""
     env = AttitudeEnv(5, world=world())
     context = env.context(env.default_params)
-    torque, still = tuple(jnp.array([1e-3, -2e-3, 3e-3])), jnp.zeros(3)
+    torque = tuple(jnp.array([1e-3, -2e-3, 3e-3]))
+    still = observations.observe(jnp.array([0.0, 0.0, 0.6, 0.8]), jnp.zeros(3))
     for duration, share in ((context.control_period, 1.0), (0.0, 0.5)):
         known = dataclasses.replace(
             context, inertia=jnp.diag(context.inertia), torque_duration=duration
         )
         found = adaptation.leaned(still, torque, known)
         wanted = share * context.control_period * jnp.stack(torque) / context.inertia
-        np.testing.assert_allclose(found, wanted, rtol=1e-5)
+        np.testing.assert_allclose(found[8:], wanted, rtol=1e-5)
+        np.testing.assert_allclose(found, observations.observe(still[:4], found[8:]))
     np.testing.assert_array_equal(adaptation.leaned(still, None, context), still)
 
 

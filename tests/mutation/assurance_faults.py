@@ -5,6 +5,7 @@ STOPPING = ["tests/control/test_stopping.py"]
 CLOSED = ["tests/control/test_assured.py"]
 CONES = ["tests/control/test_keep_out.py"]
 STATED = ["tests/envs/test_bounds.py"]
+ADAPTING = ["tests/control/test_assured_adaptation.py"]
 ASSURANCE_FAULTS = {
     "the least of what lowers P taken for the most": (
         "attjax/control/plants.py", "straight += jnp.maximum(", "straight += jnp.minimum(", BOUNDS,
@@ -46,6 +47,35 @@ ASSURANCE_FAULTS = {
     "a gain's deviation for its bound": (
         "attjax/envs/torque_bounds.py", "return _end(number, largest(number), DEVIATIONS)",
         "return number if isinstance(number, float | int) else number.moments[0]", STATED,
+    ),
+    "a change in mid-flight that has no bound": (
+        "attjax/envs/torque_bounds.py", "math.prod(map(high, given)) * max(1, high(change))",
+        "math.prod(map(high, given))", STATED,
+    ),
+    "a rate that is leaned for the one that is": (
+        "attjax/control/flight_loop.py", "chosen(observation, self.scores(shown, known))",
+        "chosen(shown, self.scores(shown, known))", ADAPTING,
+    ),
+    "a delay looked across by what was identified": (
+        "attjax/control/flight_loop.py", "queue = adaptation.given(memory.queue, context)",
+        "queue = _bodily(memory, known)", ADAPTING,
+    ),
+    "a filter's mean where the truth is told": (
+        "attjax/control/estimator.py",
+        "return _as_told(estimate, told) if context.knowledge.is_told else estimate",
+        "return estimate", ADAPTING,
+    ),
+    "a torque that is estimated, across a delay": (
+        "attjax/control/flight_loop.py", "estimate = estimate.replace(torque=None)", "pass",
+        ADAPTING,
+    ),
+    "what was believed before the flight for the controller": (
+        "attjax/control/flight_loop.py", "known, shown = self.believed(memory, context)",
+        "known, shown = context", ADAPTING,
+    ),
+    "scores in the policy's own order": (
+        "attjax/ppo/networks.py", "lowest.at[own_units.rows(context)].max(logits)",
+        "lowest.at[: len(logits)].max(logits)", ["tests/control/test_own_units.py"],
     ),
 }  # fmt: skip
 """As faults.FAULTS."""

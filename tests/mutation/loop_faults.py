@@ -36,7 +36,7 @@ LOOP_FAULTS = {
         "attjax/control/flight_loop.py", "queue.later(belief.rk4_steps(context))", "queue", LOOP,
     ),
     "a held torque for the whole period, whenever it begins": (
-        "attjax/control/belief.py", "lasting = following - start", "lasting = steps", LOOP,
+        "attjax/control/belief.py", "steps_on = following - start", "steps_on = steps", LOOP,
     ),
     "rounding left out of a variance": (
         "attjax/control/covariance.py", "rounded = ROUNDINGS * rounding", "rounded = 0 * rounding",
