@@ -33,10 +33,18 @@ class Run:
         wall_s: how long it has trained, s.
     """
 
-    def __init__(self, config: Config, setup: Setup):
+    def __init__(self, config: Config, setup: Setup, networks: dict | None = None):
+        """At its start, with parameters of networks of another run in place of random ones."""
         self.config, self.setup = config, setup
         self.env_params = build.env_params(setup, config.seed)
         self.learner = train_state.init(setup, self.env_params, jax.random.key(config.seed))
+        if networks:
+            drawn = self.learner.params
+            placed = {
+                name: jax.device_put(network, jax.tree.map(lambda x: x.sharding, drawn[name]))
+                for name, network in networks.items()
+            }
+            self.learner = self.learner.replace(params=drawn | placed)
         self.update, self.wall_s = 0, 0.0
         self.rows: list[dict] = []
         self._clock: float | None = None
