@@ -73,9 +73,8 @@ def train(
             there. An :class:`Observer` hears more.
         debug_nans: check every operation, and name the first that makes a NaN; slow.
         settings: by name, in place of the preset's: any of ``train.py --help``; ``world``, a
-            :class:`attjax.world.World` or the name of one, "ideal" by default; and
-            ``resume_from``, the folder of a run whose networks this one begins with, and whose
-            preset, settings, spacecraft and world it has where they are not given.
+            :class:`attjax.world.World` or the name of one, "ideal" by default; ``resume_from``, the
+            folder of a run to begin with the networks of, and with all else that is not given.
 
     Returns:
         The run: ``policy``, ``metrics``, ``env``, and all else of :class:`attjax.runs.run.Run`.

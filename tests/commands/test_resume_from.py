@@ -31,7 +31,7 @@ def train(*flags):
         (["--resume-from", "nowhere"], "there is no checkpoint folder"),
         (["--resume-from", ROOT], "is no attjax checkpoint"),
         (["--resume-from", ""], "the path is ''"),
-        (["--frameskips", "10499,20"], "in 43.75 s, the duration of an episode"),
+        (["--frameskips", "5,10500"], "frameskips holds"),
         (["--resume-from", PRECISE, "--resume", "--overwrite"], "not allowed with"),
     ],
 )

@@ -12,6 +12,7 @@ from attjax.config import run as run_config
 from attjax.errors import UserError
 from attjax.runs import checkpoint, origin
 from attjax.runs import folder as run_folder
+from attjax.runs import run as run_module
 from attjax.runs.folder import FolderError
 from attjax.runs.keeper import Place
 from attjax.runs.run import Run
@@ -174,6 +175,39 @@ def test_a_policy_without_value_network_is_continued_with_a_new_one(old, moved, 
         on(old, None, anew, resume_from=None, preset=SMALL)
     assert_same(seen.params["value"], anew.params["value"])
     assert not run_folder.read_config(tmp_path / "new").resumed_from.has_value
+
+
+def test_the_policy_waits_for_a_new_value_network(old, moved, tmp_path, monkeypatch):
+    """Two updates here, whatever a block has, and whoever is killed within them."""
+    monkeypatch.setattr(run_module, "HELD", 2)
+    shutil.rmtree(moved / "2" / "learner")
+    policies, values, given = [], [], {"total_steps": 4 * UPDATE, "updates_per_block": 3}
+
+    class Seen(Observer):
+        def started(self, run, _):
+            self._run = run
+            self.block({})
+
+        def block(self, row):
+            policies.append(jax.tree.map(np.array, self._run.learner.params["policy"]))
+            values.append(jax.tree.map(np.array, self._run.learner.params["value"]))
+
+    whole = on((moved,), None, Seen(), **given)
+    assert [int(row["agent_steps"]) for row in whole.rows] == [n * UPDATE for n in (1, 2, 4)]
+    for held in policies[:3]:
+        assert_same(held, old[1].learner.params["policy"])
+    assert not any(map(is_same, jax.tree.leaves(policies[2]), jax.tree.leaves(policies[3])))
+    assert not any(map(is_same, jax.tree.leaves(values[0]), jax.tree.leaves(values[1])))
+    place = Place(folder=tmp_path / "new", save_every=0)
+    with pytest.raises(Killed):
+        on((moved,), place, Killer(1), **given)
+    assert checkpoint.latest(place.folder) == 1
+    resumed = attjax.train(folder=Place(folder=place.folder, resume=True))
+    assert_same(resumed.learner, whole.learner)
+
+
+def is_same(a, b):
+    return np.array_equal(a, b)
 
 
 def test_it_can_take_the_place_of_a_run(old, moved, tmp_path):

@@ -4,7 +4,7 @@ After each update the greedy policy flies slews at 40 Hz. It has adapted in the 
 which on all slews end at the goal with a mean terminal error of at most 1.2 times the last one's.
 
 Example:
-    python benchmarks/adaptation.py docs/examples/lm50-doubled.toml --from pretrained/precise
+    python benchmarks/continued.py docs/examples/lm50-doubled.toml --from pretrained/precise
 """
 
 import argparse
@@ -41,7 +41,7 @@ class Judge(Observer):
         print("{:>10,} agent steps: {:7.2%} success, {:.6f}°".format(*self.points[-1]), flush=True)
 
 
-@errors.program("adaptation.py")
+@errors.program("continued.py")
 def main(argv=None) -> int:
     """Train, and print the course and when it had adapted."""
     parser = argparse.ArgumentParser(description=__doc__)
