@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from attjax import devices, errors
 from attjax.config import command_line, fields, presets, toml
 from attjax.config import run as run_config
-from attjax.runs import signals
+from attjax.runs import origin, signals
 
 USAGE = "%(prog)s [--preset NAME] [--checkpoint FOLDER] [--resume] [FLAG ...]"
 EXAMPLES = """\
@@ -21,6 +21,7 @@ examples:
   python train.py --preset paper --print-config > run.toml
   python train.py --config run.toml --checkpoint runs/paper
   python train.py --spacecraft mine.toml --checkpoint runs/mine
+  python train.py --resume-from ckpt --spacecraft heavier.toml --checkpoint runs/on
 """
 
 
@@ -52,9 +53,14 @@ def _add_run(group):
     resume_help = "continue the folder's run, or start it if there is none"
     existing.add_argument("--resume", action="store_true", help=resume_help)
     existing.add_argument("--overwrite", action="store_true", help="replace the folder's run")
+    from_help = (
+        "a new run that begins with the networks of this folder's, and is like it but for flags"
+    )
+    group.add_argument("--resume-from", type=command_line.path, metavar="FOLDER", help=from_help)
     command_line.add_seed_and_device(group, "seed of everything random")
     config_help = (
-        "TOML file with preset, seed, [settings], [spacecraft] and [world]; flags override it"
+        "TOML file with preset, seed, resume_from, [settings], [spacecraft] and [world]; "
+        "flags override it"
     )
     group.add_argument("--config", type=command_line.path, metavar="FILE", help=config_help)
     print_help = "print the file that reproduces this run, and end"
@@ -76,7 +82,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parse_arguments(argv)
     with errors.one_line_errors(ValueError):
         given = _given(arguments)
-        new = run_config.new(**given)
+        if arguments.print_config or "resume_from" not in given:
+            new = origin.new(given)
     if arguments.print_config:
         print(toml.text(new), end="")
         return 0
@@ -115,7 +122,7 @@ def _train(given, place, stop, arguments):
 def _given(arguments):
     """By name, what the command line says of the run, and the file where it says nothing."""
     given = {} if arguments.config is None else toml.read(arguments.config)
-    for name in ("preset", "seed"):
+    for name in ("preset", "seed", "resume_from"):
         if getattr(arguments, name) is not None:
             given[name] = getattr(arguments, name)
     if arguments.spacecraft is not None:

@@ -46,6 +46,8 @@ class Terminal(Observer):
             print(presets.REMARKS[config.preset])
         if device.platform == "gpu" and config.preset in presets.ON_A_GPU:
             print(presets.ON_A_GPU[config.preset])
+        if config.resumed_from is not None and not run.update:
+            print(_beginning(config.resumed_from))
         if run.update:
             print(f"resumed at {run.agent_steps:,} agent steps")
 
@@ -82,6 +84,12 @@ def diverged(error: Diverged) -> int:
     """Print what was not finite; returns the exit status."""
     errors.error_line(error)
     return DIVERGED
+
+
+def _beginning(origin):
+    """What networks it begins with."""
+    value = "" if origin.has_value else ", which holds no value network: that begins anew"
+    return f"begins with the networks of update {origin.update} of {origin.folder}{value}"
 
 
 def _announce_longer(run, before):

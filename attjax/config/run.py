@@ -2,11 +2,13 @@
 
 import dataclasses
 import operator
+import os
+from pathlib import Path
 from typing import Any
 
 from attjax.config.presets import PRECISE, PRESETS
 from attjax.config.settings import Settings
-from attjax.errors import UserError
+from attjax.errors import UserError, UserValueError
 from attjax.spacecraft import LM50, Spacecraft
 from attjax.world import IDEAL, World, check_moving
 
@@ -19,6 +21,36 @@ FOREIGN = {"td3": "TD3"}
 
 Of its settings only task and network are the policy's; those of PPO say nothing.
 """
+
+
+NETWORKS = "features", "hidden_sizes", "initial_weights", "actions", "observes_quaternion_rate"
+"""Settings that say what networks are, and what their inputs and outputs mean."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Origin:
+    """The checkpoint whose networks a run began with.
+
+    Attributes:
+        folder: of its run, absolute.
+        run: the id of that run; None of an earlier version's.
+        update: that it was saved at.
+        has_value: whether it has a value network; otherwise that began anew.
+
+    Raises:
+        ValueError: one of them is of another type.
+    """
+
+    folder: str
+    run: str | None
+    update: int
+    has_value: bool
+
+    def __post_init__(self):
+        kinds = {"folder": str, "run": str | None, "update": int, "has_value": bool}
+        wrong = {x: y for x, y in vars(self).items() if not isinstance(y, kinds[x])}
+        if wrong:
+            raise ValueError(f"resumed_from has {wrong!r:.80}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,6 +66,7 @@ class Config:
     settings: Settings
     spacecraft: Spacecraft = LM50
     world: World = IDEAL
+    resumed_from: Origin | None = None
 
     def __post_init__(self):
         object.__setattr__(self, "seed", operator.index(self.seed))
@@ -100,12 +133,58 @@ def new(
     return Config(preset, seed, settings, spacecraft, World.of(world))
 
 
+def continued(old: Config, origin: Origin, given: dict) -> Config:
+    """The configuration of a new run that begins with the networks of another.
+
+    Args:
+        old: of the other run.
+        origin: the checkpoint.
+        given: preset, seed, spacecraft, world, settings, by name, where they are not the other
+            run's; the seed is 0 where it is not given.
+
+    Raises:
+        UserValueError: the networks would be others, or the run is no PPO's.
+        ValueError: as :func:`new`.
+    """
+    if old.preset in FOREIGN:
+        name = FOREIGN[old.preset]
+        raise UserValueError(f"--resume-from takes runs of PPO; {origin.folder} is one of {name}")
+    kept = {"spacecraft": old.spacecraft, "world": old.world}
+    if "preset" not in given:
+        kept |= {"preset": CUSTOM, **old.settings.flat}
+    preset = given.get("preset", old.preset)
+    config = dataclasses.replace(new(**kept | given), preset=preset, resumed_from=origin)
+    ours, theirs = config.settings.flat, old.settings.flat
+    differing = [f"{x} is {ours[x]}, not {theirs[x]}" for x in NETWORKS if ours[x] != theirs[x]]
+    count, needed = config.spacecraft.num_actions, old.spacecraft.num_actions
+    is_of_table = ours["actions"] == "discrete" and ours["features"] != "universal"
+    if is_of_table and count != needed:
+        differing.append(f"{config.spacecraft} has {count} actions, not {needed}")
+    if differing:
+        listed = "; ".join(differing)
+        raise UserValueError(f"--resume-from keeps the networks of {origin.folder}: {listed}")
+    return config
+
+
+def real_path(folder: str | Path) -> str:
+    """The folder that a run is to begin from: absolute, without links, with ``~`` for a home.
+
+    Raises:
+        UserValueError: no folder can have that name.
+    """
+    try:
+        return os.path.realpath(Path(folder).expanduser())
+    except (ValueError, RuntimeError) as error:
+        raise UserValueError(f"resume_from is {str(folder)!r}: {error}") from None
+
+
 def lengthened(config: Config, given: dict) -> Config:
     """What a run was started with, with a larger total of steps if one is given.
 
     Args:
         config: of the run.
-        given: preset, seed, spacecraft, world, settings, by name, that it is to be continued with.
+        given: preset, seed, spacecraft, world, settings, and the folder that it began from, by
+            name, that it is to be continued with.
 
     Raises:
         UserError: one of them is not the run's, the total is smaller, or the run is no PPO's.
@@ -116,9 +195,11 @@ def lengthened(config: Config, given: dict) -> Config:
         )
     before = config.settings.ppo.total_steps
     total = given.get("total_steps", before)
-    run = vars(config) | config.settings.flat | {"total_steps": total}
-    if "world" in given:
-        given = given | {"world": World.of(given["world"])}
+    origin = config.resumed_from and config.resumed_from.folder
+    run = vars(config) | config.settings.flat | {"total_steps": total, "resume_from": origin}
+    for name, read in (("world", World.of), ("resume_from", real_path)):
+        if name in given:
+            given = given | {name: read(given[name])}
     differing = [name for name, value in given.items() if run[name] != value]
     if differing:
         listed = ", ".join(f"{name} ({run[name]})" for name in differing)

@@ -20,12 +20,14 @@ SETTINGS = settings.FIELDS
 OTHERS = (
     fields.single("preset", str, "the recipe", choices=tuple(presets.PRESETS)),
     fields.single("seed", int, "of everything random", **fields.SEED),
+    fields.single("resume_from", str, "folder of the run whose networks it begins with"),
 )
 FIELDS = SETTINGS | {field.name: field for field in OTHERS}
 
 
 def read(path: Path) -> dict:
-    """Preset, seed, settings, spacecraft and world of a file, by name; it need not give all.
+    """Preset, seed, settings, spacecraft and world of a file, by name, and the folder that the run
+    begins from; it need not give all.
 
     Raises:
         UserError: it cannot be read, or something in it is unknown or out of range.
@@ -105,7 +107,10 @@ def text(config: Config) -> str:
         >>> text(Config("paper", 3, presets.PAPER)).splitlines()[:2]
         ['preset = "paper"', 'seed = 3']
     """
-    lines = [f'preset = "{config.preset}"', f"seed = {config.seed}", "", "[settings]"]
+    lines = [f'preset = "{config.preset}"', f"seed = {config.seed}"]
+    if config.resumed_from is not None:
+        lines += [f"resume_from = {_toml(config.resumed_from.folder)}"]
+    lines += ["", "[settings]"]
     for group, title in fields.GROUPS.items():
         lines += ["", f"# --- {title} ---"]
         for name, field in SETTINGS.items():

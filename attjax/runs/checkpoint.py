@@ -8,9 +8,9 @@ aside, read back, and moved into place whole.
 import contextlib
 import functools
 import os
-import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -18,7 +18,7 @@ import orbax.checkpoint as ocp
 
 from attjax.ppo.networks import Policy
 from attjax.ppo.train_state import Learner
-from attjax.runs import belongings, build, earlier, quiet
+from attjax.runs import belongings, build, earlier, items, quiet
 from attjax.runs import folder as run_folder
 from attjax.runs.folder import FolderError
 from attjax.runs.plain_path import plain
@@ -56,14 +56,14 @@ class Saver:
         update = int(learner.update)
         if update in _saved(self._folder):
             return
-        items = {"policy": learner.params["policy"], "learner": _storable(learner)}
+        saved = {"policy": learner.params["policy"], "learner": _storable(learner)}
         terminal_error = float("inf") if terminal_error is None else terminal_error
         saving = self._folder / belongings.SAVING
         with quiet.orbax() as failures:
             try:
-                self._write(saving, items, terminal_error, update)
+                self._write(saving, saved, terminal_error, update)
             except Exception as error:  # Orbax raises many kinds, for a full disk among others
-                failures.append(_first_sentence(error))
+                failures.append(quiet.first_sentence(error))
             finally:
                 shutil.rmtree(saving, ignore_errors=True)
         if failures:
@@ -73,26 +73,26 @@ class Saver:
             with contextlib.suppress(OSError):  # tried again after the next save
                 belongings.remove(path)
 
-    def _write(self, saving, items, terminal_error, update):
+    def _write(self, saving, saved, terminal_error, update):
         shutil.rmtree(saving, ignore_errors=True)
         saving.mkdir()
         whole = saving / "checkpoint"
         with plain(saving) as place:
-            saved = {name: ocp.args.StandardSave(item) for name, item in items.items()}
-            self._orbax.save(place / whole.name, args=ocp.args.Composite(**saved))
-            self._check(place / whole.name, items)
+            arguments = {name: ocp.args.StandardSave(item) for name, item in saved.items()}
+            self._orbax.save(place / whole.name, args=ocp.args.Composite(**arguments))
+            self._check(place / whole.name, saved)
         belongings.write_label(whole, self._run, terminal_error)
         path = self._folder / str(update)
         if os.path.lexists(path):  # of someone else
             path = path.with_name(path.name + belongings.OWN_NAME)
         os.rename(whole, path)
 
-    def _check(self, path, items):
+    def _check(self, path, saved):
         """Read a checkpoint back: it must be what it was made of, to the bit."""
-        items = jax.tree.map(np.asarray, items)
-        templates = {name: ocp.args.StandardRestore(item) for name, item in items.items()}
+        saved = jax.tree.map(np.asarray, saved)
+        templates = {name: ocp.args.StandardRestore(item) for name, item in saved.items()}
         found = self._orbax.restore(path, args=ocp.args.Composite(**templates))
-        for name, item in items.items():
+        for name, item in saved.items():
             if not jax.tree.all(jax.tree.map(_same, item, found[name])):
                 raise ValueError(f"what was read back of its {name} differs")
 
@@ -159,7 +159,7 @@ def restore_learner(folder: Path, template: Learner) -> Learner:
     Raises:
         FolderError: the folder holds no checkpoint, an unreadable one or one of another run.
     """
-    restore = functools.partial(_restore, folder, latest(folder), "learner")
+    restore = functools.partial(restore_item, folder, latest(folder), "learner")
     restored = earlier.restored(restore, _storable(template))
     implementation = jax.random.key_impl(template.key)
     return restored.replace(key=jax.random.wrap_key_data(restored.key, impl=implementation))
@@ -208,11 +208,18 @@ def restore_network(folder: Path, update: int | None = None) -> tuple[Policy, di
     policy = build.policy(config.settings, config.spacecraft)
     initial = functools.partial(build.initial_parameters, policy, config.spacecraft)
     template = jax.eval_shape(initial)["policy"]
-    params = _restore(folder, latest(folder) if update is None else update, "policy", template)
+    params = restore_item(folder, latest(folder) if update is None else update, "policy", template)
     return policy, {"policy": params}
 
 
-def _restore(folder, update, item, template):
+def restore_item(
+    folder: Path, update: int | None, item: str, template: Any, is_part: bool = False
+) -> Any:
+    """An item of a checkpoint, or the part of it that ``template`` has, placed like that.
+
+    Raises:
+        FolderError: there is no such checkpoint, or it cannot be read.
+    """
     if update is None:
         raise FolderError(f"{folder} holds no checkpoint yet")
     saved = _saved(folder)
@@ -225,20 +232,14 @@ def _restore(folder, update, item, template):
     )
     with quiet.orbax() as failures:
         try:
-            with ocp.StandardCheckpointer() as checkpointer, plain(path) as place:
-                return checkpointer.restore(place / item, target)
+            with plain(path) as place:
+                return items.read(place / item, target, is_part)
         except Exception as error:  # Orbax raises many kinds for damaged files
-            failures.append(_first_sentence(error))
+            failures.append(quiet.first_sentence(error))
     advice = ""
     if len(saved) > 1 and belongings.is_surely_own(path, run_folder.run_id(Path(folder))):
         advice = f"; remove {path} to go back to the checkpoint before it"
     raise FolderError(f"checkpoint {path.absolute() / item} cannot be read: {failures[0]}{advice}")
-
-
-def _first_sentence(error):
-    """What went wrong, in a line; of a long one the beginning and the end, where the cause is."""
-    sentence = re.split(r"\n|\. ", str(error).strip())[0] or type(error).__name__
-    return sentence if len(sentence) <= 200 else f"{sentence[:90]} … {sentence[-110:]}"
 
 
 def _storable(learner):

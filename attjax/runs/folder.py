@@ -18,7 +18,7 @@ from types import ModuleType
 
 from attjax import spacecraft
 from attjax.config import settings
-from attjax.config.run import Config
+from attjax.config.run import Config, Origin
 from attjax.config.settings import FIELDS
 from attjax.errors import UserError, warning_line
 from attjax.runs import belongings
@@ -190,14 +190,15 @@ def read_config(folder: Path) -> Config:
             settings.from_json(content["settings"]),
             spacecraft.from_lists(content["spacecraft"]),
             World.from_lists(content["world"]),
+            content["resumed_from"] and Origin(**content["resumed_from"]),
         )
     except (ValueError, KeyError, TypeError, OverflowError) as error:
         raise FolderError(f"{path} cannot be read: {error!r}") from None
 
 
 def _upgraded(content):
-    """Formats 10, 9 and 7 had ever fewer settings, and 5 had them in one table; up to 8 there
-    was the ideal world only.
+    """Up to format 10 every run began anew and learned on what is measured; 9 had fewer settings, 7
+    still fewer, and 5 had them in one table; up to format 8 there was the ideal world only.
     """
     version, given = content["format"], content["settings"]
     if version > 5:
@@ -205,7 +206,8 @@ def _upgraded(content):
     later = {name: f.metadata["before"] for name, f in FIELDS.items() if "before" in f.metadata}
     by_subject = dataclasses.asdict(settings.from_flat(later | given))
     world = {} if version > 8 else {"world": IDEAL.table()}
-    return content | world | {"format": FORMAT, "settings": by_subject}
+    origin = {"resumed_from": None}
+    return content | world | origin | {"format": FORMAT, "settings": by_subject}
 
 
 UPGRADES = dict.fromkeys(range(5, FORMAT), _upgraded)

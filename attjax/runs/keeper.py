@@ -8,7 +8,7 @@ from typing import Protocol
 
 from attjax.config import run as run_config
 from attjax.errors import UserError
-from attjax.runs import build, checkpoint, metrics_file
+from attjax.runs import beginning, build, checkpoint, metrics_file, origin
 from attjax.runs import folder as run_folder
 from attjax.runs.run import Run
 
@@ -69,17 +69,22 @@ class Keeper:
         """Begin or continue the folder's run, with what is given of it by name."""
         self._place, folder = place, place.folder
         self.lengthened_from = None
-        if place.resume and run_folder.holds_run(folder):
+        goes_on = place.resume and run_folder.holds_run(folder)
+        if goes_on:
             old = run_folder.read_config(folder)
             config = run_config.lengthened(old, given)
-            self.run = Run(config, build.of_config(config))
             self.lengthened_from = old.settings if config != old else None
         else:
-            config = run_config.new(**given)
-            # Before a run gives way to this one: it fails where a user's function cannot be used.
-            setup = build.of_config(config)
+            config = origin.new(given)
+            origin.check_other(config, folder)
+        # Before a run gives way to this one: it fails where a user's function cannot be used, or
+        # the networks that it begins with not be read.
+        setup, networks = build.of_config(config), {}
+        if not goes_on or checkpoint.latest(folder) is None:
+            networks = beginning.networks(config, setup)
+        if not goes_on:
             run_folder.create(folder, config, place.overwrite)
-            self.run = Run(config, setup)
+        self.run = Run(config, setup, networks)
         saved = self.run.learner
         if checkpoint.latest(folder) is not None:
             saved = checkpoint.restore_learner(folder, saved)

@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import logging
+import re
 import sys
 import traceback
 from collections.abc import Iterator
@@ -37,6 +38,12 @@ def orbax() -> Iterator[list[str]]:
             if failures:
                 logger.addFilter(_is_not_of_orbax)
             logger.setLevel(level)
+
+
+def first_sentence(error: Exception) -> str:
+    """What went wrong, in a line; of a long one the beginning and the end, where the cause is."""
+    sentence = re.split(r"\n|\. ", str(error).strip())[0] or type(error).__name__
+    return sentence if len(sentence) <= 200 else f"{sentence[:90]} … {sentence[-110:]}"
 
 
 def _show(hook, unraisable):

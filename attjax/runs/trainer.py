@@ -7,7 +7,7 @@ from typing import Any
 
 from attjax.config import run as run_config
 from attjax.config.settings import Settings
-from attjax.runs import build
+from attjax.runs import beginning, build, origin
 from attjax.runs import folder as run_folder
 from attjax.runs.keeper import Keeper, Place
 from attjax.runs.run import Diverged, Run
@@ -64,7 +64,7 @@ def train(
 
     Args:
         preset: the recipe, by name, or settings of one's own; by default "precise", or what the
-            folder's run was started with.
+            folder's run, or that of ``resume_from``, was started with.
         seed: of everything random; 0 by default.
         spacecraft: what flies, and its task; LM50, the paper's, by default.
         folder: to keep the run in, as ``train.py --checkpoint`` does; a :class:`Place` says how,
@@ -72,8 +72,9 @@ def train(
         callback: called with each block's row of metrics; where it returns True, the run ends
             there. An :class:`Observer` hears more.
         debug_nans: check every operation, and name the first that makes a NaN; slow.
-        settings: by name, in place of the preset's: any of ``train.py --help``; and ``world``, a
-            :class:`attjax.world.World` or the name of one, "ideal" by default.
+        settings: by name, in place of the preset's: any of ``train.py --help``; ``world``, a
+            :class:`attjax.world.World` or the name of one, "ideal" by default; ``resume_from``, the
+            folder of a run to begin with the networks of, and with all else that is not given.
 
     Returns:
         The run: ``policy``, ``metrics``, ``env``, and all else of :class:`attjax.runs.run.Run`.
@@ -111,8 +112,9 @@ def _observer(callback):
 
 
 def _train_in_memory(given, observer, debug_nans):
-    config = run_config.new(**given)
-    run = Run(config, build.of_config(config))
+    config = origin.new(given)
+    setup = build.of_config(config)
+    run = Run(config, setup, beginning.networks(config, setup))
     observer.started(run, None)
     _train(run, observer, None, debug_nans)
     return run
@@ -123,6 +125,8 @@ def _train_in_folder(place, given, observer, debug_nans):
         keeper = Keeper(place, given)
         observer.started(keeper.run, keeper.lengthened_from)
         with keeper:
+            if keeper.run.config.resumed_from is not None:
+                keeper.save()  # so that it needs the other run's folder no more
             _train(keeper.run, observer, keeper, debug_nans)
             keeper.save()
     return keeper.run

@@ -5,6 +5,8 @@ the newest must load, and the next start must go on from it. In the end all arra
 learner and all rows of metrics.csv but their clock must equal, to the bit, those of a run that
 nobody disturbed.
 
+With --continued it is a run that begins with the networks of another, ``--resume-from``.
+
 Example:
     python tests/helpers/kills.py --kills 200 --jobs 2
 """
@@ -38,16 +40,19 @@ def main(argv=None) -> int:
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--jobs", type=int, default=1, help="runs at a time")
     parser.add_argument("--seed", type=int, default=0, help="of the instants")
+    parser.add_argument("--continued", action="store_true", help="a run that begins with another's")
     arguments = parser.parse_args(argv)
     runs = -(-arguments.kills // KILLS_A_RUN)
     with tempfile.TemporaryDirectory() as scratch:
-        calm = Run(Path(scratch) / "calm", random.Random(0))
+        more = _begun_from(Path(scratch) / "other") if arguments.continued else []
+        calm = Run(Path(scratch) / "calm", random.Random(0), more)
         calm.finish()
         expected = calm.result()
 
         def disturbed(number):
             kills = min(KILLS_A_RUN, arguments.kills - number * KILLS_A_RUN)
-            run = Run(Path(scratch) / str(number), random.Random(f"{arguments.seed}/{number}"))
+            instants = random.Random(f"{arguments.seed}/{number}")
+            run = Run(Path(scratch) / str(number), instants, more)
             report = run.disturb(kills)
             run.finish()
             same = equal(run.result(), expected)
@@ -61,11 +66,20 @@ def main(argv=None) -> int:
     return 0 if same == runs else 1
 
 
-class Run:
-    """A training run that can be killed."""
+def _begun_from(folder):
+    """The flags of a run on another spacecraft, from a first one that is trained here."""
+    other = Run(folder, random.Random(0), ["--seed=1", "--total-steps=2560"])
+    other.finish()
+    craft = ROOT / "docs" / "examples" / "lm50-doubled.toml"
+    return [f"--resume-from={folder}", f"--spacecraft={craft}"]
 
-    def __init__(self, folder: Path, instants: random.Random):
+
+class Run:
+    """A training run that can be killed, with more flags than TRAIN."""
+
+    def __init__(self, folder: Path, instants: random.Random, more: list[str]):
         self._folder, self._instants, self._newest = folder, instants, -1
+        self._more = more
 
     def disturb(self, kills: int) -> str:
         """Kill it that often; returns where it stood then.
@@ -99,7 +113,7 @@ class Run:
         return flat(tree), rows
 
     def _start(self):
-        command = [*TRAIN, "--checkpoint", str(self._folder)]
+        command = [*TRAIN, *self._more, "--checkpoint", str(self._folder)]
         environment = os.environ | {"PYTHONUNBUFFERED": "1"}
         return subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
