@@ -25,6 +25,9 @@ AXES, LEVELS = 3, 3
 ACTIONS = 1 + 2 * LEVELS * AXES
 """Torques that are chosen from: none, and each level about each axis in both directions."""
 
+DEAD = 1e-4
+"""Share of the largest torque below which one has been identified to do nothing."""
+
 FLATTEST = 1e-3
 """Volume that unit vectors along the axes must span, at least."""
 
@@ -86,7 +89,8 @@ def rows(context: Context) -> chex.Array:
     """(ACTIONS,) rows of a spacecraft's torque table: those that are chosen from, in order.
 
     Axes are in ascending order of momentum; levels are the largest, the one nearest to the middle
-    of their logarithms, and the smallest. Of fewer than three, one stands more than once.
+    of their logarithms, and the smallest that is not dead. Of fewer than three, one stands more
+    than once.
 
     Raises:
         ValueError: the table is not one of three torque axes.
@@ -170,15 +174,18 @@ def ordered(context: Context) -> Context:
 
 
 def _three_of(levels):
-    """(3,) numbers of the largest level, of one between, and of the smallest."""
-    first, last = jnp.argmax(levels), jnp.argmin(levels)
+    """(3,) numbers of the largest level, of one between, and of the smallest that is not dead."""
+    first = jnp.argmax(levels)
+    is_dead = levels < DEAD * levels[first]
+    last = jnp.argmin(jnp.where(is_dead, jnp.inf, levels))
     if len(levels) <= 2:
         return jnp.stack([first, last, last])
     logarithms = jnp.log(levels)
     between = abs(logarithms - 0.5 * (logarithms[first] + logarithms[last]))
     numbers = jnp.arange(len(levels))
-    is_end = (numbers == first) | (numbers == last)
-    return jnp.stack([first, jnp.argmin(jnp.where(is_end, jnp.inf, between)), last])
+    is_out = (numbers == first) | (numbers == last) | is_dead
+    middle = jnp.argmin(jnp.where(is_out, jnp.inf, between))
+    return jnp.stack([first, jnp.where(jnp.all(is_out), last, middle), last])
 
 
 def _order(shape):
@@ -191,10 +198,23 @@ def _order(shape):
 
 
 def _axes_and_levels(torque_table):
-    """(3, 3) unit vectors, a row each, and the (levels,) torques about them, N m."""
-    first = torque_table[1 :: 2 * AXES]
-    levels = jnp.sqrt(first[:, 0] ** 2 + first[:, 1] ** 2 + first[:, 2] ** 2)
-    return torque_table[1 : 1 + 2 * AXES : 2] / levels[0], levels
+    """(3, 3) directions, a row each, and the (levels,) largest torques along them, N m.
+
+    They are unit vectors, but where the axes have been identified to be of different strength.
+    """
+    up = torque_table[1::2].reshape(-1, AXES, 3)
+    sizes = jnp.sqrt(up[..., 0] ** 2 + up[..., 1] ** 2 + up[..., 2] ** 2)
+    levels = jnp.max(sizes, axis=1)
+    largest = jnp.argmax(levels)
+    return _alive(up[largest] / levels[largest]), levels
+
+
+def _alive(directions):
+    """The directions; in place of one that does nothing, a weak one across both others."""
+    a, b, c = directions
+    across = jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
+    squared = jnp.sum(directions**2, axis=1, keepdims=True)
+    return jnp.where(squared < DEAD**2, DEAD * across, directions)
 
 
 def _shape(directions, inertia):

@@ -168,12 +168,34 @@ def test_a_spacecraft_in_order_flies_by_the_same_torques(x64):
         ((0.01, 0.4), (0.4, 0.01, 0.01)),
         ((0.01, 0.4, 0.02), (0.4, 0.02, 0.01)),
         ((0.3, 0.001, 0.2, 0.02, 0.002), (0.3, 0.02, 0.001)),
+        ((0.4, 0.02, 0.0), (0.4, 0.02, 0.02)),
+        ((0.4, 0.02, 1e-6), (0.4, 0.02, 0.02)),
+        ((0.0, 0.4, 0.0), (0.4, 0.4, 0.4)),
+        ((0.3, 0.0, 0.2, 0.02, 0.002), (0.3, 0.02, 0.002)),
     ],
 )
 def test_three_levels_are_chosen(levels, chosen):
-    context = own_units.ordered(context_of(Spacecraft(torque_levels=levels)))
+    """Those that have been identified to be dead are none of them."""
+    table = Spacecraft(torque_levels=[1.0] * len(levels)).torque_table
+    table = np.array(table) * np.append([0], np.repeat(levels, 6))[:, None]
+    context = dataclasses.replace(context_of(LM50), torque_table=jnp.asarray(table, jnp.float32))
+    context = own_units.ordered(context)
     sizes = np.linalg.norm(context.torque_table, axis=1)
     np.testing.assert_allclose(sizes, [0, *np.repeat(chosen, 6)], rtol=1e-6)
+
+
+def test_axes_that_were_identified_to_be_weak_or_dead_are_seen(x64):
+    """An impulse still adds one about its axis, whatever its size; of none all stays finite."""
+    context = context_of(PULSES)
+    for gains in ((1, 0.5, 0.8), (1, 0.5, 0)):
+        table = context.torque_table * np.array(gains)  # PULSES has torques along the body axes
+        weak = own_units.ordered(dataclasses.replace(context, torque_table=table))
+        state = observation.observe(jnp.array([0.3, -0.2, 0.4, 0.84]), jnp.full(3, 0.02))
+        assert np.all(np.isfinite(universal.universal_features(state, weak)))
+        if gains[2]:
+            impulse = weak.torque_table[1:7:2] * weak.torque_duration
+            gained = OwnUnits.of(weak).momentum @ np.linalg.solve(weak.inertia, impulse.T)
+            np.testing.assert_allclose(gained, np.eye(3), atol=1e-12)
 
 
 def test_spacecraft_without_three_axes_are_refused(as_users_run):
