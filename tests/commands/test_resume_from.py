@@ -31,7 +31,6 @@ def train(*flags):
         (["--resume-from", "nowhere"], "there is no checkpoint folder"),
         (["--resume-from", ROOT], "is no attjax checkpoint"),
         (["--resume-from", ""], "the path is ''"),
-        (["--frameskips", "5,10500"], "frameskips holds"),
         (["--resume-from", PRECISE, "--resume", "--overwrite"], "not allowed with"),
     ],
 )
@@ -46,6 +45,15 @@ def test_a_spacecraft_with_another_number_of_actions_is_refused(tmp_path, capsys
     flags = train("--spacecraft", tmp_path / "two.toml", "--checkpoint", tmp_path / "new")
     error = one_line_error(train_script.main, flags, capsys)
     assert "keeps the networks of" in error and "two has 13 actions, not 19" in error
+
+
+def test_an_episode_that_is_too_short_is_one_line(tmp_path, capsys):
+    short = "inertia = [1, 1, 1]\ntorque_levels = [0.5, 0.05, 0.005]\nduration = 0.05\n"
+    (tmp_path / "short.toml").write_text(short)
+    flags = train("--spacecraft", tmp_path / "short.toml", "--checkpoint", tmp_path / "new")
+    for more in ([], ["--resume"]):
+        error = one_line_error(train_script.main, [*flags, *more], capsys)
+        assert "frameskips holds 20; in 0.05 s" in error
 
 
 def test_universal_inputs_fit_any_number_of_actions(tmp_path):
