@@ -69,7 +69,7 @@ def test_its_own_folder_is_refused(tmp_path, capsys, flags, no_work):
     folder = shutil.copytree(PRECISE, tmp_path / "old")
     before = sorted(path.name for path in folder.iterdir())
     os.symlink(folder, tmp_path / "link")
-    flags = ["--resume-from", tmp_path / "link", "--checkpoint", folder, *flags]
+    flags = ["--resume-from", folder, "--checkpoint", tmp_path / "link", *flags]
     error = one_line_error(train_script.main, train(*flags), capsys)
     if "--resume" in flags:
         assert "leave out resume_from (None)" in error
