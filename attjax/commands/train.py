@@ -21,7 +21,7 @@ examples:
   python train.py --preset paper --print-config > run.toml
   python train.py --config run.toml --checkpoint runs/paper
   python train.py --spacecraft mine.toml --checkpoint runs/mine
-  python train.py --resume-from ckpt --spacecraft heavier.toml --checkpoint runs/on
+  python train.py --resume-from ckpt --spacecraft mine.toml --checkpoint new
 """
 
 

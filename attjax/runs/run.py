@@ -20,7 +20,7 @@ HELD = 8
 """Updates in which only the value network learns, where a policy is continued without its own.
 
 What a new one says of a trained policy's actions is noise at first: without them a policy with
-85 % success had 60 % after four updates (docs/train.md).
+89 % success had 62 % after four updates (docs/train.md).
 """
 
 

@@ -31,21 +31,29 @@ def train(*flags):
         (["--resume-from", "nowhere"], "there is no checkpoint folder"),
         (["--resume-from", ROOT], "is no attjax checkpoint"),
         (["--resume-from", ""], "the path is ''"),
-        (["--frameskips", "5,10500"], "frameskips holds"),
         (["--resume-from", PRECISE, "--resume", "--overwrite"], "not allowed with"),
     ],
 )
-def test_what_is_refused(flags, named, tmp_path, capsys):
+def test_what_is_refused(flags, named, tmp_path, capsys, no_work):
     flags = train(*flags, "--checkpoint", tmp_path / "new")
     assert named in one_line_error(train_script.main, flags, capsys)
     assert not list(tmp_path.rglob("config.json"))
 
 
-def test_a_spacecraft_with_another_number_of_actions_is_refused(tmp_path, capsys):
+def test_a_spacecraft_with_another_number_of_actions_is_refused(tmp_path, capsys, no_work):
     (tmp_path / "two.toml").write_text(THREE_AXES)
     flags = train("--spacecraft", tmp_path / "two.toml", "--checkpoint", tmp_path / "new")
     error = one_line_error(train_script.main, flags, capsys)
     assert "keeps the networks of" in error and "two has 13 actions, not 19" in error
+
+
+def test_an_episode_that_is_too_short_is_one_line(tmp_path, capsys, no_work):
+    short = "inertia = [1, 1, 1]\ntorque_levels = [0.5, 0.05, 0.005]\nduration = 0.05\n"
+    (tmp_path / "short.toml").write_text(short)
+    flags = train("--spacecraft", tmp_path / "short.toml", "--checkpoint", tmp_path / "new")
+    for more in ([], ["--resume"]):
+        error = one_line_error(train_script.main, [*flags, *more], capsys)
+        assert "frameskips holds 20; in 0.05 s" in error
 
 
 def test_universal_inputs_fit_any_number_of_actions(tmp_path):
@@ -57,11 +65,11 @@ def test_universal_inputs_fit_any_number_of_actions(tmp_path):
 
 
 @pytest.mark.parametrize("flags", [[], ["--overwrite"], ["--resume"]])
-def test_its_own_folder_is_refused(tmp_path, capsys, flags):
+def test_its_own_folder_is_refused(tmp_path, capsys, flags, no_work):
     folder = shutil.copytree(PRECISE, tmp_path / "old")
     before = sorted(path.name for path in folder.iterdir())
     os.symlink(folder, tmp_path / "link")
-    flags = ["--resume-from", tmp_path / "link", "--checkpoint", folder, *flags]
+    flags = ["--resume-from", folder, "--checkpoint", tmp_path / "link", *flags]
     error = one_line_error(train_script.main, train(*flags), capsys)
     if "--resume" in flags:
         assert "leave out resume_from (None)" in error
@@ -70,13 +78,13 @@ def test_its_own_folder_is_refused(tmp_path, capsys, flags):
     assert sorted(path.name for path in folder.iterdir()) == before
 
 
-def test_a_run_without_checkpoint_is_refused(tmp_path, capsys):
+def test_a_run_without_checkpoint_is_refused(tmp_path, capsys, no_work):
     shutil.copy(PRECISE / "config.json", tmp_path)
     flags = train("--resume-from", tmp_path, "--checkpoint", tmp_path / "new")
     assert "holds no checkpoint yet" in one_line_error(train_script.main, flags, capsys)
 
 
-def test_a_run_of_another_learner_is_refused(tmp_path, capsys):
+def test_a_run_of_another_learner_is_refused(tmp_path, capsys, no_work):
     folder = shutil.copytree(PRECISE, tmp_path / "td3")
     content = json.loads((folder / "config.json").read_text())
     (folder / "config.json").write_text(json.dumps(content | {"preset": "td3"}))
@@ -85,7 +93,7 @@ def test_a_run_of_another_learner_is_refused(tmp_path, capsys):
     assert "--resume-from takes runs of PPO" in error and "is one of TD3" in error
 
 
-def test_the_file_that_is_printed_describes_the_same_run(tmp_path, capsys):
+def test_the_file_that_is_printed_describes_the_same_run(tmp_path, capsys, no_work):
     flags = ["--spacecraft", str(ROOT / "docs/examples/lm50-doubled.toml"), "--seed", "3"]
     assert train_script.main([*train(), *flags, "--print-config"]) == 0
     text = capsys.readouterr().out
@@ -107,7 +115,7 @@ def run_folder_origin(folder):
 
 
 @pytest.mark.parametrize("path", ["", "\\u0000", "~nobody-of-that-name/x", "nowhere"])
-def test_folders_in_a_file_that_are_none(tmp_path, capsys, path):
+def test_folders_in_a_file_that_are_none(tmp_path, capsys, path, no_work):
     (tmp_path / "run.toml").write_text(f'resume_from = "{path}"\n')
     flags = ["--device=cpu", "--config", str(tmp_path / "run.toml")]
     flags += ["--checkpoint", str(tmp_path / "new")]
