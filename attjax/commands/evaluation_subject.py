@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 POLICY = "policy"
 NOT_WITH = {
-    "robustness": ("world", "bare", "adaptive", "assured", "sampled", "playback", "fleet"),
+    "robustness": ("world", "bare", "keep_out", "sampled", "playback", "fleet"),
     "fleet": ("spacecraft", "world", "assured", "plot", "playback"),
     "bare": ("adaptive",),
 }
@@ -62,7 +62,8 @@ def complete(arguments: argparse.Namespace) -> None:
     for ladder, flags in NOT_WITH.items():
         for flag in flags if getattr(arguments, ladder) else ():
             if getattr(arguments, flag):
-                raise errors.UserError(f"--{flag} does not go with --{ladder}")
+                shown = flag.replace("_", "-")
+                raise errors.UserError(f"--{shown} does not go with --{ladder}")
 
 
 def world(arguments: argparse.Namespace, config: run_config.Config | None) -> World:
@@ -157,7 +158,7 @@ def flown(
     from attjax.runs import checkpoint, flight
 
     controller, scores = _controller(name, arguments, env, config), None
-    if arguments.robustness:  # which flies each in both ways
+    if arguments.robustness:  # which flies each in every way
         return controller
     if assurance is not None and name == POLICY and not arguments.sampled:
         update = checkpoint.best(arguments.checkpoint) if arguments.best else None

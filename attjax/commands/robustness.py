@@ -29,7 +29,8 @@ def judge(
     # Imported late: with them, --help and errors in the arguments would take seconds.
     from attjax.evaluation import robustness, robustness_table
 
-    flights = robustness.Flights(env, arguments.episodes, arguments.seed or 0)
+    how = {"adaptive": arguments.adaptive, "assured": arguments.assured}
+    flights = robustness.Flights(env, arguments.episodes, arguments.seed or 0, **how)
     start, written = time.monotonic(), []
     with evaluation_output.flying("conditions", None) as told:
         rows = robustness.robustness(controllers, flights, told)

@@ -11,11 +11,13 @@ import jax
 import numpy as np
 
 from attjax import evaluation
+from attjax.control.assured import assurance
 from attjax.control.flight_loop import flight_loop
 from attjax.envs.attitude import AttitudeEnv
 from attjax.evaluation.episodes import Episodes, fly_side_by_side
 from attjax.evaluation.flown import Controller
 from attjax.evaluation.ladder import conditions
+from attjax.ppo.networks import Policy
 from attjax.spacecraft import LM50
 from attjax.world import World, made_for
 
@@ -32,11 +34,15 @@ class Flights:
             are of another spacecraft.
         episodes: slews of each controller, with its flight loop and without.
         seed: of the slews, and of what each condition leaves open.
+        adaptive: whether each controller flies in a loop that adapts, too; none does with wheels.
+        assured: whether run-time assurance follows every flight loop.
     """
 
     env: AttitudeEnv
     episodes: int = 1000
     seed: int = 0
+    adaptive: bool = False
+    assured: bool = False
 
 
 def robustness(
@@ -46,7 +52,8 @@ def robustness(
 ) -> list[dict]:
     """Fly the ladder of :func:`attjax.evaluation.ladder.conditions`.
 
-    All controllers fly the same slews through the same draws, in a flight loop and without one.
+    All controllers fly the same slews through the same draws, in a flight loop and without one. A
+    policy that flies any spacecraft flies that of each named world, as the classical laws do.
 
     Args:
         controllers: plain ones by name, ``act(observation, context) -> action``.
@@ -77,7 +84,7 @@ def _rows(controllers, flights, name, world):
     able = {
         x: controller
         for x, controller in controllers.items()
-        if env.spacecraft == flights.env.spacecraft or _is_classical(controller)
+        if env.spacecraft == flights.env.spacecraft or _flies_any(controller)
     }
     return list(_flown(able, env, flights, name))
 
@@ -90,19 +97,44 @@ def environment(env: AttitudeEnv, world: World) -> AttitudeEnv:
     return dataclasses.replace(env, world=world, spacecraft=spacecraft)
 
 
-def _is_classical(controller):
-    return not jax.tree.leaves(controller)
+def _flies_any(controller):
+    """Whether it is a classical law, or a policy of any spacecraft."""
+    policy = _policy_of(controller)
+    return not jax.tree.leaves(controller) or (policy is not None and policy.is_universal)
+
+
+def _policy_of(controller):
+    """The policy whose ``act`` it is; None of a classical law."""
+    owner = getattr(getattr(controller, "func", None), "__self__", None)
+    return owner if isinstance(owner, Policy) else None
 
 
 def _flown(controllers, env, flights, name):
-    plain = [jax.tree_util.Partial(x) for x in controllers.values()]
-    crew: Any = (*map(flight_loop, plain), *plain)
+    plain: Any = tuple(jax.tree_util.Partial(x) for x in controllers.values())
+    guard = assurance(env) if flights.assured else None
+    crews = {False: (*_loops(plain, guard, adapts=False), *plain)}
+    if flights.adaptive and env.world.wheels is None:
+        crews[True] = _loops(plain, guard, adapts=True)
     params, key = env.default_params, jax.random.key(flights.seed)
-    flown = fly_side_by_side(crew, env, params, key, flights.episodes)
-    names = [(x, has_loop) for has_loop in (True, False) for x in controllers]
-    for (controller, has_loop), of_this in zip(names, flown):
-        row = {"condition": name, "controller": controller, "flight_loop": has_loop}
-        yield row | outcome(of_this, env)
+    for adapts, crew in crews.items():
+        flown = fly_side_by_side(crew, env, params, key, flights.episodes)
+        for number, of_this in enumerate(flown):
+            has_loop, controller = number < len(plain), list(controllers)[number % len(plain)]
+            row = {"condition": name, "controller": controller, "flight_loop": has_loop}
+            row |= {"adaptive": adapts, "assured": has_loop and flights.assured}
+            yield row | outcome(of_this, env)
+
+
+def _loops(plain, guard, adapts):
+    return tuple(_loop(x, guard, adapts) for x in plain)
+
+
+def _loop(controller, guard, adapts):
+    policy = _policy_of(controller)
+    if guard is None or policy is None:
+        return flight_loop(controller, adapts=adapts, assurance=guard)
+    scores = jax.tree_util.Partial(policy.scores, *controller.args)
+    return flight_loop(controller, adapts=adapts, assurance=guard, scores=scores)
 
 
 def outcome(flown: Episodes, env: AttitudeEnv) -> dict[str, Any]:

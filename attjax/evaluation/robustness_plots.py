@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from attjax import canvas
-from attjax.evaluation.robustness_table import angle
+from attjax.evaluation.robustness_table import angle, way
 
 MARKERS = "o^sDv"
+FILLS = {"loop": "full", "adaptive": "left", "bare": "none"}
 LEAST_DEG = 1e-6
 """Smaller angles are drawn as this, as a logarithm needs one."""
 
@@ -23,12 +24,12 @@ def write_all(rows: Sequence[dict], folder: Path) -> list[Path]:
 def heat_map(rows: Sequence[dict], folder: Path) -> Path:
     """Success and pointing of each controller in each condition."""
     conditions = list(dict.fromkeys(row["condition"] for row in rows))
-    flown = list(dict.fromkeys((row["controller"], row["flight_loop"]) for row in rows))
+    flown = list(dict.fromkeys((row["controller"], way(row)) for row in rows))
     angles = np.full((len(conditions), len(flown)), np.nan)
     figure, axis = canvas.subplots(figsize=(3 + 1.5 * len(flown), 1 + 0.32 * len(conditions)))
     for row in rows:
         y = conditions.index(row["condition"])
-        x = flown.index((row["controller"], row["flight_loop"]))
+        x = flown.index((row["controller"], way(row)))
         if row["rms_deg"] is not None:
             angles[y, x] = max(row["rms_deg"], LEAST_DEG)
         is_dark = abs(np.log10(angles[y, x]) + 1.5) > 2  # and not where there is no angle
@@ -36,7 +37,7 @@ def heat_map(rows: Sequence[dict], folder: Path) -> Path:
         axis.text(x, y, _words(row), ha="center", va="center", fontsize=7, color=ink)
     image = axis.imshow(np.log10(angles), aspect="auto", cmap="RdYlGn_r", vmin=-4.5, vmax=1.5)
     figure.colorbar(image, label="log10 of the rms error over the last fifth (°)")
-    names = [f"{name}\n{'flight loop' if has_loop else 'bare'}" for name, has_loop in flown]
+    names = [f"{name}\n{'flight loop' if how == 'loop' else how}" for name, how in flown]
     axis.set_xticks(range(len(flown)), names, fontsize=8)
     axis.set_yticks(range(len(conditions)), conditions, fontsize=8)
     axis.xaxis.tick_top()
@@ -57,15 +58,17 @@ def pointing_against_knowledge(rows: Sequence[dict], folder: Path) -> Path:
     figure, axis = canvas.subplots(figsize=(7, 5))
     shown = [row for row in rows if row["rms_deg"] and (row["estimate_rms_deg"] or 0) > LEAST_DEG]
     for n, name in enumerate(dict.fromkeys(row["controller"] for row in shown)):
-        for has_loop in (True, False):
-            of_this = [r for r in shown if (r["controller"], r["flight_loop"]) == (name, has_loop)]
+        for how, fill in FILLS.items():
+            of_this = [r for r in shown if (r["controller"], way(r)) == (name, how)]
+            if not of_this:
+                continue
             axis.loglog(
                 [row["estimate_rms_deg"] for row in of_this],
                 [row["rms_deg"] for row in of_this],
                 MARKERS[n % len(MARKERS)],
                 color=f"C{n}",
-                fillstyle="full" if has_loop else "none",
-                label=name if has_loop else f"{name}, bare",
+                fillstyle=fill,
+                label=name if how == "loop" else f"{name}, {how}",
             )
     ends = np.array(axis.get_xlim())
     axis.plot(ends, ends, color="0.6", linewidth=1, label="pointing as exact as knowledge")

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from attjax.evaluation.robustness import Flights, wilson
 from attjax.evaluation.tables import console
 
-HEADS = ("", "success (%)", "overspeed (%)", "rms (°)", "max (°)", "believed", "settling", "N m s")
-WIDTHS = (19, 19, 18, 9, 9, 9, 9, 6)
+HEADS = ("", "success (%)", "overspeed (%)", "rms (°)", "max (°)", "believed", "settl.", "N m s")
+WIDTHS = (23, 19, 18, 9, 9, 9, 7, 6)
 NOTE = """\
 Success and overspeed with 95 % intervals (Wilson). rms and max: error angle over the last fifth of
 the slews that kept the rate limit. believed: rms, in degrees, of what was taken for the attitude,
-against the truth. settling: s, mean of the successes. N m s: impulse, mean. A name alone is of the
-flight loop and of the bare controller both, where they do the same."""
+against the truth. settl.: settling time, s, mean of the successes. N m s: impulse, mean. A name
+alone is of the flight loop and of the bare controller both, where they do the same."""
 
 
 def print_table(rows: Sequence[dict], flights: Flights) -> None:
@@ -20,8 +20,11 @@ def print_table(rows: Sequence[dict], flights: Flights) -> None:
     env, out = flights.env, console()
     out.print(
         f"{flights.episodes:,} slews a row at {1 / env.control_period:.2f} Hz "
-        f"(frameskip {env.frameskip}), {env.spacecraft.name}, seed {flights.seed}\n"
+        f"(frameskip {env.frameskip}), {env.spacecraft.name}, seed {flights.seed}"
     )
+    if flights.assured:
+        out.print("flight loops under run-time assurance")
+    out.print()
     out.print(_line(HEADS), style="dim")
     for condition, group in itertools.groupby(rows, lambda row: row["condition"]):
         out.print(condition, style="bold")
@@ -45,15 +48,22 @@ def named(rows: Sequence[dict]) -> list[tuple[str, dict]]:
     for row in rows:
         has_twin = sum(without_loop(row) == without_loop(other) for other in rows) > 1
         if not has_twin:
-            found.append((f"{row['controller']}, {'loop' if row['flight_loop'] else 'bare'}", row))
+            found.append((f"{row['controller']}, {way(row)}", row))
         elif row["flight_loop"]:
             found.append((row["controller"], row))
     return found
 
 
+def way(row: dict) -> str:
+    """How it was flown: bare, in a flight loop, or in one that adapts."""
+    if row.get("adaptive"):
+        return "adaptive"
+    return "loop" if row["flight_loop"] else "bare"
+
+
 def without_loop(row: dict) -> dict:
     """The row, but for whether it is in a flight loop."""
-    return {name: x for name, x in row.items() if name != "flight_loop"}
+    return {name: x for name, x in row.items() if name not in ("flight_loop", "assured")}
 
 
 def _line(words):

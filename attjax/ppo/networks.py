@@ -96,7 +96,7 @@ class Policy:
         if self.actions == "continuous":
             return Inputs(features, None)
         allowed, backward = jnp.ones(self.num_actions, bool), None
-        if self._is_universal:
+        if self.is_universal:
             backward, context = backward_axes(observation, context), own_units.ordered(context)
         if self.rate_margin > 0:
             angular_velocity = observation[observations.ANGULAR_VELOCITY]
@@ -104,12 +104,13 @@ class Policy:
         return Inputs(features, allowed, backward)
 
     @property
-    def _is_universal(self):
+    def is_universal(self) -> bool:
+        """Whether it flies any spacecraft with three torque axes."""
         return self.features == "universal"
 
     def command(self, action: chex.Array, context: Context) -> chex.Array:
         """The spacecraft's action, a row of its torque table or (3,) fractions, of the policy's."""
-        return own_units.rows(context)[action] if self._is_universal else action
+        return own_units.rows(context)[action] if self.is_universal else action
 
     def outputs(self, params: dict, inputs: Inputs) -> chex.Array:
         """(outputs, samples) of (samples, ...) inputs: logits are MASKED_LOGIT where masked."""
@@ -153,7 +154,7 @@ class Policy:
         """
         outputs = _one_of_a_batch(lambda params, inputs: self.outputs(params, inputs).T)
         logits = outputs(params, self.encode(observation, context))
-        if not self._is_universal:
+        if not self.is_universal:
             return logits
         lowest = jnp.full(len(context.torque_table), 2 * MASKED_LOGIT, logits.dtype)
         return lowest.at[own_units.rows(context)].max(logits)

@@ -18,8 +18,8 @@ from attjax.spacecraft import LM50
 from attjax.world import made_for, names
 
 KEYS = (
-    "condition", "controller", "flight_loop", "episodes", "success_rate", "overspeed_rate",
-    "rms_deg", "max_deg", "estimate_rms_deg", "settling_time_s", "impulse_N_m_s",
+    "condition", "controller", "flight_loop", "adaptive", "assured", "episodes", "success_rate",
+    "overspeed_rate", "rms_deg", "max_deg", "estimate_rms_deg", "settling_time_s", "impulse_N_m_s",
 )  # fmt: skip
 LAWS = {"phase-plane": phase_plane, "feedback": quaternion_feedback}
 SHORT = AttitudeEnv(20, spacecraft=Spacecraft(duration=14.0, slew_angles_deg=(5, 10)))
@@ -102,6 +102,19 @@ def test_rows_are_of_each_controller_in_both_ways(two_conditions):
     assert ideal[0]["settling_time_s"] == pytest.approx(judged["settling_time_s"]["mean"])
 
 
+def test_rows_of_loops_that_adapt_and_of_assured_ones(two_conditions):
+    flights = robustness.Flights(SHORT, episodes=4, seed=1, adaptive=True, assured=True)
+    rows = robustness.robustness(LAWS, flights)
+    assert all(tuple(row) == KEYS for row in rows)
+    ways = [(row["flight_loop"], row["adaptive"], row["assured"]) for row in rows[:6]]
+    looped, bare, adaptive = (True, False, True), (False, False, False), (True, True, True)
+    assert ways == [looped] * 2 + [bare] * 2 + [adaptive] * 2
+    names = [name for name, _ in robustness_table.named(rows[6:])]
+    laws = list(LAWS)
+    expected = [f"{law}, {way}" for way in ("loop", "bare", "adaptive") for law in laws]
+    assert names == expected
+
+
 def test_the_small_spacecrafts_worlds_are_flown_with_their_own():
     for name in names()[1:]:
         env = robustness.environment(SHORT, World.named(name))
@@ -132,8 +145,6 @@ def test_the_command_prints_draws_and_writes(two_conditions, tmp_path, capsys):
     [
         ["--world", "stress"],
         ["--bare"],
-        ["--adaptive"],
-        ["--assured"],
         ["--sampled"],
         ["--playback", "page.html"],
     ],
