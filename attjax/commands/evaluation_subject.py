@@ -82,7 +82,7 @@ def spacecraft(
 ) -> Spacecraft:
     """What flies, with the duration that was asked for.
 
-    Without a file and a policy it is what the world was described for.
+    Without a file and a policy of one spacecraft it is what the world was described for.
 
     Raises:
         UserError: its file cannot be read or describes none, or the duration is too short.
@@ -92,7 +92,10 @@ def spacecraft(
     elif arguments.spacecraft is not None:
         craft = toml.read_spacecraft(arguments.spacecraft)
     else:
-        craft = config.spacecraft if config else made_for(world)
+        craft = made_for(world)
+        flies_any = config is not None and config.settings.network.features == "universal"
+        if config and not (flies_any and craft != LM50):
+            craft = config.spacecraft
     if arguments.duration is not None:
         try:
             craft = dataclasses.replace(craft, duration=arguments.duration)

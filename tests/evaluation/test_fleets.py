@@ -1,5 +1,6 @@
 """Slews of which each is flown by another spacecraft."""
 
+import argparse
 import json
 
 import jax
@@ -9,6 +10,8 @@ import pytest
 from commands import eval_script, one_line_error
 
 from attjax import AttitudeEnv, Spacecraft, World, evaluation, flight_loop
+from attjax.commands import evaluation_subject
+from attjax.config import run as run_config
 from attjax.control.classical import phase_plane, quaternion_feedback
 from attjax.control.time_optimal import rate_limited_reference, time_optimal_reference
 from attjax.envs import parameters
@@ -138,3 +141,18 @@ def test_a_fleet_in_another_world_is_refused():
     env = AttitudeEnv(20, world=World.named("lm50-leo"))
     with pytest.raises(ValueError, match="the world is lm50-leo; a fleet flies in the ideal one"):
         evaluation.evaluate_fleet(phase_plane, env, episodes=2)
+
+
+def test_a_policy_of_any_spacecraft_flies_that_of_a_named_world():
+    """As the classical laws do; a policy of one spacecraft, and a world of none, have the run's."""
+    arguments = argparse.Namespace(fleet=False, spacecraft=None, duration=None, frameskip=5)
+    tug = Spacecraft(name="tug")
+    cubesat, stress = World.named("cubesat-6u"), World.named("stress")
+    for preset, world, name in (
+        ("universal", cubesat, "6U CubeSat"),
+        ("universal", stress, "tug"),
+        ("precise", cubesat, "tug"),
+    ):
+        config = run_config.new(preset, spacecraft=tug)
+        assert evaluation_subject.spacecraft(arguments, config, world).name == name
+    assert evaluation_subject.spacecraft(arguments, None, cubesat).name == "6U CubeSat"
