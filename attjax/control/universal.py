@@ -18,7 +18,7 @@ OWN_SCALES = tuple(4.0**n for n in range(-5, 4))
 SLEW_SCALES = tuple(2.0**n for n in range(-1, 3))
 """Factors of these over a slew's length: of inputs that are about 1 at the start of any slew."""
 
-PAIRS = np.array([0, 0, 1]), np.array([1, 2, 2])
+PAIRS = (0, 1), (0, 2), (1, 2)
 """Of axes, whose products of inertia the inputs tell."""
 
 CONSTANTS, PRODUCTS, HAND = 14, (3, 4, 5), 13
@@ -81,8 +81,7 @@ def _constants(units):
     """What kind of spacecraft it is, in numbers of about 1."""
     moments = jnp.diagonal(units.shape)
     root = jnp.sqrt(moments)
-    first, second = PAIRS
-    products = units.shape[first, second] / (root[first] * root[second])
+    products = jnp.stack([units.shape[i, j] / (root[i] * root[j]) for i, j in PAIRS])
     tenths = 10 * units.period
     last = jnp.stack([units.duration / units.period, jnp.log(tenths), units.hand])
     parts = (
@@ -146,9 +145,11 @@ def _turn(numbers, vector, rate):
 
 def signs_of_constants(sign: Array) -> Float[Array, "constants"]:
     """What the constants are multiplied by where (3,) signs say which way is forward."""
-    first, second = PAIRS
-    signs = jnp.ones(CONSTANTS, sign.dtype).at[np.array(PRODUCTS)].set(sign[first] * sign[second])
-    return signs.at[HAND].set(sign[0] * sign[1] * sign[2])
+    unsigned = jnp.ones(CONSTANTS, sign.dtype)
+    before, between = unsigned[: PRODUCTS[0]], unsigned[PRODUCTS[-1] + 1 : HAND]
+    products = jnp.stack([sign[i] * sign[j] for i, j in PAIRS])
+    hand = sign[0] * sign[1] * sign[2]
+    return jnp.concatenate([before, products, between, hand[None]])
 
 
 def _times(matrix, vector):

@@ -140,8 +140,7 @@ def _universal_in_c(context):
 
 
 def _pairs_in_c():
-    pairs = zip(*universal.PAIRS)
-    return "{" + ", ".join(f"{{{a}, {b}}}" for a, b in pairs) + "}"
+    return "{" + ", ".join(f"{{{a}, {b}}}" for a, b in universal.PAIRS) + "}"
 
 
 def _universal_in_onnx(graph, context):
@@ -191,7 +190,7 @@ def _signs_of_constants(graph, sign):
     """As universal.signs_of_constants."""
     first, second = (
         graph.add("Gather", [sign, graph.constant(f"{name}_axes", axes)], name, axis=1)
-        for name, axes in zip(("first", "second"), universal.PAIRS)
+        for name, axes in zip(("first", "second"), np.array(universal.PAIRS).T)
     )
     products = graph.add("Mul", [first, second], "sign_products")
     hand = graph.add("ReduceProd", [sign], "sign_of_hand", axes=[1], keepdims=1)

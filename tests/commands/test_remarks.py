@@ -24,7 +24,9 @@ from attjax.spacecraft import LM50
 def test_it_names_the_preset_that_one_might_rather_take(preset, platform, named, capsys):
     device = SimpleNamespace(platform=platform, device_kind="a device")
     settings = PRESETS[preset]
-    config = SimpleNamespace(preset=preset, spacecraft=LM50, seed=0, settings=settings)
+    config = SimpleNamespace(
+        preset=preset, spacecraft=LM50, seed=0, settings=settings, resumed_from=None
+    )
     setup = SimpleNamespace(num_devices=1)
     run = SimpleNamespace(config=config, total_steps=1, setup=setup, update=0)
     Terminal(Path("folder"), device, None).started(run, None)
