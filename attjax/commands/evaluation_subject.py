@@ -93,8 +93,7 @@ def spacecraft(
         craft = toml.read_spacecraft(arguments.spacecraft)
     else:
         craft = made_for(world)
-        flies_any = config is not None and config.settings.network.features == "universal"
-        if config and not (flies_any and craft != LM50):
+        if config and not (config.settings.network.is_universal and craft != LM50):
             craft = config.spacecraft
     if arguments.duration is not None:
         try:
@@ -180,7 +179,7 @@ def _controller(name, arguments, env, config):
     if name != POLICY:
         return jax.tree_util.Partial(classical.CONTROLLERS[name])
     folder, trained_on = arguments.checkpoint, config.spacecraft
-    is_universal = config.settings.network.features == "universal"
+    is_universal = config.settings.network.is_universal
     if is_universal:
         with errors.one_line_errors(ValueError):
             own_units.check_axes(env.spacecraft)

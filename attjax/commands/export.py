@@ -130,7 +130,7 @@ def _spacecraft(arguments, config):
     """What the policy is to fly; of a universal one with its torques in the policy's order."""
     from attjax.control import own_units
 
-    is_universal, file = config.settings.network.features == "universal", arguments.spacecraft
+    is_universal, file = config.settings.network.is_universal, arguments.spacecraft
     if file is not None and not is_universal:
         raise errors.UserError(
             f"--spacecraft is for universal policies; the one in {arguments.checkpoint} flies "

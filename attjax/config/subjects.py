@@ -102,6 +102,11 @@ class Network(Checked):
         high=1,
     )
 
+    @property
+    def is_universal(self) -> bool:
+        """Whether they are for any spacecraft with three torque axes."""
+        return self.features == "universal"
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class PPO(Checked):

@@ -10,6 +10,7 @@ from attjax.control import belief, covariance, identification, linearized, measu
 from attjax.control.covariance import product
 from attjax.control.linearized import AXES
 from attjax.control.response import Identity, Period
+from attjax.control.square_root import times
 from attjax.dynamics import rigid_body, vectors
 from attjax.dynamics.actuators import Queue
 from attjax.envs import observation as observations
@@ -86,22 +87,18 @@ def _shares(identity):
     root, inertia = identity.spread.response, jnp.stack([jnp.stack(x) for x in identity.inertia])
     along, across = [], []
     for a, column in enumerate(identity.columns):
-        momentum = _product(inertia, root[6 + 3 * a : 9 + 3 * a])
-        size = _product(inertia, jnp.stack(column)[:, None])
+        momentum = times(inertia, root[6 + 3 * a : 9 + 3 * a])
+        size = times(inertia, jnp.stack(column)[:, None])
         square = jnp.maximum(jnp.sum(size**2), identification.LEAST)
         along.append(jnp.sum(jnp.sum(momentum * size, axis=0) ** 2) / square)
         across.append(jnp.maximum(jnp.sum(momentum**2) - along[-1], 0) / 2)
     rows = response.gyroscopic(identity.mobility, identity.rate)
-    turning = _product(inertia, jnp.stack([jnp.stack(row) for row in rows]))
-    swung = jnp.sum(_product(turning, root[:6]) ** 2)
-    momentum = _product(inertia, jnp.stack(identity.rate)[:, None])
+    turning = times(inertia, jnp.stack([jnp.stack(row) for row in rows]))
+    swung = jnp.sum(times(turning, root[:6]) ** 2)
+    momentum = times(inertia, jnp.stack(identity.rate)[:, None])
     most = jnp.sum(jnp.stack(identity.rate) ** 2) * jnp.sum(momentum**2)
     share = jnp.sqrt(swung / jnp.maximum(most, identification.LEAST))
     return jnp.max(jnp.stack(along)), jnp.sqrt(jnp.max(jnp.stack(across))), share
-
-
-def _product(a, b):
-    return jnp.matmul(a, b, precision="highest")
 
 
 def bodily(queue: Queue, identity: Identity, context: Context) -> Queue:

@@ -56,8 +56,7 @@ class OwnUnits(NamedTuple):
     @property
     def hand(self) -> chex.Array:
         """1 where the axes are right-handed, else -1."""
-        a, b, c = self.directions
-        return jnp.where(_dot(a, jnp.cross(b, c)) < 0, -1, 1)
+        return jnp.where(_dot(self.directions[0], _across(self.directions)[0]) < 0, -1, 1)
 
     @classmethod
     def of(cls, context: Context) -> "OwnUnits":
@@ -211,10 +210,8 @@ def _axes_and_levels(torque_table):
 
 def _alive(directions):
     """The directions; in place of one that does nothing, a weak one across both others."""
-    a, b, c = directions
-    across = jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
-    squared = jnp.sum(directions**2, axis=1, keepdims=True)
-    return jnp.where(squared < DEAD**2, DEAD * across, directions)
+    squared = jnp.stack([_dot(axis, axis) for axis in directions])
+    return jnp.where(squared[:, None] < DEAD**2, DEAD * _across(directions), directions)
 
 
 def _shape(directions, inertia):
@@ -232,9 +229,14 @@ def _product(a, b):
 
 def _reciprocal(directions):
     """The matrix whose product with Σ pⱼ aⱼ is p."""
+    rows = _across(directions)
+    return rows / _dot(directions[0], rows[0])
+
+
+def _across(directions):
+    """(3, 3) the cross product of the two other directions, in cyclic order, for each: rows."""
     a, b, c = directions
-    rows = jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
-    return rows / _dot(a, rows[0])
+    return jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
 
 
 def _dot(a, b):

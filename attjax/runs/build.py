@@ -43,7 +43,7 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
     """
     name = settings.network.features
     features: str | Callable = name
-    if name == "universal":
+    if settings.network.is_universal:
         if settings.task.actions != "discrete":
             raise UserValueError("universal features are for discrete actions, not continuous ones")
         try:
@@ -58,7 +58,7 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
     return Policy(
         features,
         network.hidden_sizes,
-        own_units.ACTIONS if features == "universal" else craft.num_actions,
+        own_units.ACTIONS if settings.network.is_universal else craft.num_actions,
         network.rate_margin,
         network.initial_weights,
         settings.task.actions,
