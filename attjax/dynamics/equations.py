@@ -125,11 +125,13 @@ class EquationsOfMotion(NamedTuple):
         torque: I⁻¹ M of the commanded torque, rad/s²; None while none is on.
         gyroscopic: the terms of −I⁻¹ (ω × Iω).
         kinematics: of the attitude.
+        pushing: I⁻¹ d of a torque d that always acts, rad/s²; None: there is none.
     """
 
     torque: Vector | None
     gyroscopic: PrincipalTerms | TensorTerms
     kinematics: Kinematics
+    pushing: Vector | None = None
 
     @classmethod
     def of(
@@ -176,6 +178,8 @@ class EquationsOfMotion(NamedTuple):
         acceleration = self.gyroscopic.acceleration(state.angular_velocity)
         if self.torque is not None:
             acceleration = add(acceleration, self.torque)
+        if self.pushing is not None:
+            acceleration = add(acceleration, self.pushing)
         return RigidState(
             quaternion=self.kinematics.rate(state.quaternion, state.angular_velocity),
             angular_velocity=acceleration,

@@ -92,12 +92,14 @@ def take(
     torque: Float[Array | np.ndarray, "3"],
     inertia: rigid_body.Inertia,
     steps_after: Real[ArrayLike, ""] | None = None,
+    disturbance: Float[Array | np.ndarray, "3"] | None = None,
 ) -> tuple[Float[Array, "4"], Float[Array, "3"]]:
     """:func:`propagate`, by any kinematics.
 
     Args:
         agent_step: the frameskip, whether the torque is held, and the kinematics.
         quaternion, angular_velocity, torque, inertia, steps_after: as in :func:`propagate`.
+        disturbance: (3,) torque that acts in all the steps, body frame, N m; None: there is none.
 
     Returns:
         As :func:`propagate`.
@@ -106,6 +108,11 @@ def take(
         quaternion, angular_velocity, torque, inertia
     )
     equations = EquationsOfMotion.of(inertia, apart(torque), agent_step.kinematic_factor)
+    if disturbance is not None:
+        disturbance = checks.real("disturbance", disturbance, (3,))
+        _check_type("disturbance", disturbance, inertia)
+        acceleration = rate_after_impulse(jnp.zeros_like(torque), disturbance, inertia, 1.0)
+        equations = equations._replace(pushing=tuple(acceleration))
     start = RigidState.of(quaternion, angular_velocity)
     limit = None if steps_after is None else jnp.asarray(steps_after, quaternion.dtype)
     change = integration.change(agent_step, start, equations, limit)
@@ -143,6 +150,10 @@ def _checked(quaternion, angular_velocity, torque, inertia):
         "torque": checks.real("torque", torque, (3,)),
     }
     for name, x in vectors.items():
-        if x.dtype != inertia.dtype:
-            raise ValueError(f"{name} has type {x.dtype}; it must be {inertia.dtype}, as inertia")
+        _check_type(name, x, inertia)
     return *vectors.values(), inertia
+
+
+def _check_type(name, x, inertia):
+    if x.dtype != inertia.dtype:
+        raise ValueError(f"{name} has type {x.dtype}; it must be {inertia.dtype}, as inertia")

@@ -8,7 +8,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from attjax.dynamics import quaternion as quaternions
-from attjax.dynamics import rigid_body
 from attjax.dynamics.fused_loop import apart
 from attjax.dynamics.integration import AgentStep
 from attjax.dynamics.numerics import squared_norm
@@ -16,6 +15,7 @@ from attjax.envs import initial_state, parameters, simulator, spaces, torques, w
 from attjax.envs import observation as observations
 from attjax.envs.context import Context, believed
 from attjax.envs.keys import observation_key, steps_key
+from attjax.envs.leaning import leaned
 from attjax.envs.parameters import EnvParams, EnvState
 from attjax.envs.restart import restart_one
 from attjax.envs.reward import Transition, paper_reward
@@ -190,6 +190,7 @@ class AttitudeEnv:
             goal_angle=params.goal_angle,
             control_period=parameters.control_period(params, self.frameskip),
             impulse=torque * self.context(params).torque_duration,
+            torque_table=params.torque_table,
         )
         angle = quaternions.error_angle(next_state.quaternion)
         info = {
@@ -209,14 +210,19 @@ class AttitudeEnv:
     def observe(self, key: chex.PRNGKey, state: EnvState, params: EnvParams) -> chex.Array:
         """What an agent is told of a state: the observation (11,) of Eq. 11, as measured.
 
+        Where there is a disturbance, :func:`attjax.envs.leaning.leaned` against it.
+
         Args:
             key: unused: what is random of it is of the state.
             state, params: of one spacecraft.
         """
-        del key, params
+        del key
         rules = self.kinematic_factor, self.observes_quaternion_rate
         told = parameters.measured(state)
-        return observations.observe(told.quaternion, told.angular_velocity, *rules)
+        observation = observations.observe(told.quaternion, told.angular_velocity, *rules)
+        if params.disturbance is None:
+            return observation
+        return leaned(observation, self.context(params))
 
     def starts_whole(self, state: EnvState) -> chex.Array:
         """Whether the episode that begins with this state is one of the task's: a bool a state.
@@ -230,16 +236,7 @@ class AttitudeEnv:
 
         Coasting can raise ‖ω‖ at constant energy by at most √(I_max/I_min).
         """
-        moments = rigid_body.principal_moments(params.inertia)
-        context = self.context(params)
-        torque = context.largest_torque
-        if self._is_continuous:
-            torque = jnp.linalg.norm(torques.largest_torques(context.torque_table))
-        kick = torque * context.torque_duration / jnp.min(moments)
-        rate = (params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))
-        one = jnp.ones_like(rate)
-        high = jnp.stack([one] * 4 + [self.kinematic_factor * rate] * 4 + [rate] * 3)
-        return spaces.Box(-high, high)
+        return spaces.observation_box(params, self.context(params))
 
     def action_space(self, params: EnvParams | None = None) -> spaces.Discrete | spaces.Box:
         """The rows of the torque table, or fractions of its largest torque about each body axis."""

@@ -23,7 +23,10 @@ Stepped: TypeAlias = tuple[chex.Array, chex.ArrayTree, chex.Array, chex.Array, c
 
 
 def param_axes(env: Any, params: chex.ArrayTree) -> Any:
-    """For ``vmap``: 0 for parameters in which the spacecraft differ, None for the others."""
+    """For ``vmap``: 0 for parameters in which the spacecraft differ, None for the others.
+
+    They differ in those that have more axes than the environment's own, where it has None, any.
+    """
     return jax.tree.map(
         lambda x, default: 0 if np.ndim(x) > np.ndim(default) else None, params, env.default_params
     )

@@ -24,6 +24,7 @@ class Context:
         knowledge: of the world; by default the truth is told, and torques come at once.
         steps_after: RK4 steps after the first in a control period, where those of one program
             differ; None: those of ``agent_step``.
+        disturbance: (3,) torque that always acts, body frame, N m; None: none is known.
         agent_step: what is known of a control period when it is compiled.
         observes_quaternion_rate: whether Eq. 11's q̇ is observed; a Python bool.
         continuous: whether an action is (3,) fractions of the largest torque about each body axis
@@ -38,6 +39,7 @@ class Context:
     torque_duration: chex.Numeric = INTEGRATION_STEP
     knowledge: Knowledge = Knowledge()
     steps_after: chex.Array | None = None
+    disturbance: chex.Array | None = None
     agent_step: AgentStep = struct.field(pytree_node=False, default=AgentStep(0))
     observes_quaternion_rate: bool = struct.field(pytree_node=False, default=True)
     continuous: bool = struct.field(pytree_node=False, default=False)
@@ -85,6 +87,7 @@ def believed(
         torque_duration=period if params.torque_held else INTEGRATION_STEP,
         knowledge=knowledge(world, params.inertia, period, axes),
         steps_after=params.frameskip,
+        disturbance=params.disturbance,
         agent_step=agent_step,
         observes_quaternion_rate=told[0],
         continuous=told[1],

@@ -44,6 +44,8 @@ class EnvParams(struct.PyTreeNode):
         max_steps_in_episode: time limit, agent steps, int32.
         frameskip: RK4 steps after the first in an agent step, int32, where spacecraft of one batch
             differ; at most the environment's. None: the environment's.
+        disturbance: (3,) torque that always acts, body frame, N m, and is known; in the ideal world
+            only. None: there is none.
         torque_held: whether a torque lasts through the agent step, or only its first RK4 step; a
             Python bool, the same for all of a batch.
     """
@@ -56,6 +58,7 @@ class EnvParams(struct.PyTreeNode):
     max_slew_angle: chex.Array
     max_steps_in_episode: chex.Array
     frameskip: chex.Array | None = None
+    disturbance: chex.Array | None = None
     torque_held: bool = struct.field(pytree_node=False, default=False)
 
 
@@ -106,8 +109,8 @@ def control_period(params: EnvParams, frameskip: int) -> chex.Array:
     return rk4_steps * INTEGRATION_STEP
 
 
-MATRICES = "inertia", "torque_table"
-"""Parameters of one spacecraft that have two axes; the others are numbers."""
+AXES = {"inertia": 2, "torque_table": 2, "disturbance": 1}
+"""Of the parameters of one spacecraft that are no numbers, at most."""
 
 
 def fleet_axes(params: EnvParams) -> EnvParams:
@@ -122,7 +125,7 @@ def fleet_axes(params: EnvParams) -> EnvParams:
     """
     given = {f.name: getattr(params, f.name) for f in dataclasses.fields(params)}
     axes = {
-        name: 0 if np.ndim(x) > (2 if name in MATRICES else 0) else None
+        name: 0 if np.ndim(x) > AXES.get(name, 0) else None
         for name, x in given.items()
         if name != "torque_held"
     }
@@ -151,4 +154,6 @@ def check_params(params: EnvParams, frameskip: int) -> None:
     checks.integer("max_steps_in_episode", params.max_steps_in_episode, 1, 2**31 - 1)
     if params.frameskip is not None:
         checks.integer("params.frameskip", params.frameskip, 0, frameskip)
+    if params.disturbance is not None:
+        checks.real("params.disturbance", params.disturbance, (3,))
     check_truth("params.torque_held", params.torque_held)

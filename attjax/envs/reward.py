@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float
 
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics.numerics import square_root, squared_norm
+from attjax.envs import way
 from attjax.spacecraft import INTEGRATION_STEP
 
 TERMINAL_BONUS = 50.0
@@ -41,6 +42,7 @@ class Transition(NamedTuple):
         goal_angle: largest φ that counts as pointing, rad.
         control_period: length of the agent step, s.
         impulse: (3,) what the action gives, body frame, N m s: its torque for as long as it acts.
+        torque_table: (actions, 3) torque of each action, body frame, N m; None: not told.
     """
 
     quaternion: Float[Array | np.ndarray, "4"]
@@ -51,6 +53,7 @@ class Transition(NamedTuple):
     goal_angle: Float[ArrayLike, ""]
     control_period: Float[ArrayLike, ""]
     impulse: Float[Array | np.ndarray, "3"]
+    torque_table: Float[Array | np.ndarray, "actions 3"] | None = None
 
 
 def scalar_part_increased(
@@ -115,6 +118,28 @@ def logarithmic_reward(transition: Transition) -> Float[Array, ""]:
     return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
 
 
+def way_reward(transition: Transition) -> Float[Array, ""]:
+    """As :func:`logarithmic_reward`, of the angle to turn by where only two axes are left.
+
+    −log10(φ + 1e-6) where none is dead; else −log10(s + 1e-4), with the angle s of
+    :func:`attjax.envs.way.angle_to_turn`, so that the way is worth going.
+
+    Example:
+        >>> goal = jnp.array([0.0, 0.0, 0.0, 1.0])
+        >>> rest, table = jnp.zeros(3), jnp.diag(jnp.array([0.5, 0.5, 0.0]))
+        >>> two = Transition(goal, goal, rest, False, False, 0.00436, 0.025, rest, table)
+        >>> round(way_reward(two).item(), 3)
+        4.0
+    """
+    table, quaternion = transition.torque_table, transition.next_quaternion
+    if table is None:
+        raise ValueError("torque_table is None; the reward for the way needs it")
+    offset = jnp.where(jnp.any(way.dead_axes(table)), 1e-4, 1e-6)
+    angle = way.angle_to_turn(quaternion, table)
+    reward = -jnp.log10(angle + offset) * transition.control_period / REFERENCE_PERIOD
+    return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
+
+
 def binary_reward(transition: Transition) -> Float[Array, ""]:
     """Eq. 12 and 13 without the exponential: 0 where q_s rose, −1 elsewhere, +9 within the goal.
 
@@ -166,6 +191,7 @@ def authors_continuous_reward(transition: Transition) -> Float[Array, ""]:
 REWARDS: dict[str, Callable[[Transition], Float[Array, ""]]] = {
     "paper": paper_reward,
     "logarithmic": logarithmic_reward,
+    "way": way_reward,
     "binary": binary_reward,
     "authors": authors_reward,
     "authors-continuous": authors_continuous_reward,

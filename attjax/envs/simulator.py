@@ -51,23 +51,25 @@ def step(
     check_share("kinematic_factor", kinematic_factor)
     action = checks.decision(action, len(params.torque_table), actions)
     quaternion = checks.unit_quaternion("quaternion", state.quaternion)
-    angular_velocity = checks.real("angular_velocity", state.angular_velocity, (3,))
+    rate = checks.real("angular_velocity", state.angular_velocity, (3,))
     torque = actuated(state, action, params, frameskip)
     agent_step = AgentStep(frameskip, params.torque_held, kinematic_factor)
-    moving = quaternion, angular_velocity, torque, params.inertia, params.frameskip
+    moving = quaternion, rate, torque, params.inertia, params.frameskip, params.disturbance
     have_values = all(map(checks.has_value, jax.tree.leaves((moving, state))))
     move = _compiled_move if have_values else _moved
     return EnvState(*move(agent_step, state, *moving))
 
 
-def _moved(agent_step, state, quaternion, angular_velocity, torque, inertia, steps_after):
+def _moved(agent_step, state, *moving):
     """Quaternion, angular velocity, time and plant after the step."""
     time = state.time + 1
     if state.plant is None:
-        moving = quaternion, angular_velocity, torque, inertia
-        return *propagation.take(agent_step, *moving, steps_after), time, None
+        return *propagation.take(agent_step, *moving), time, None
+    quaternion, rate, torque, _, steps_after, disturbance = moving
+    if disturbance is not None:
+        raise ValueError("params.disturbance is for the ideal world; a world has its own")
     plant = state.plant.commanded(torque, state.time)
-    moved = plant.moved(agent_step, quaternion, angular_velocity, state.time, steps_after)
+    moved = plant.moved(agent_step, quaternion, rate, state.time, steps_after)
     return *moved[:2], time, moved[2]
 
 

@@ -7,6 +7,11 @@ import chex
 import jax
 import jax.numpy as jnp
 
+from attjax.dynamics import rigid_body
+from attjax.envs.context import Context
+from attjax.envs.parameters import EnvParams
+from attjax.envs.torques import largest_torques
+
 
 @dataclasses.dataclass(frozen=True)
 class Discrete:
@@ -54,3 +59,16 @@ class Box:
         if x.shape != self.shape:
             return jnp.array(False)
         return jnp.all((x >= self.low) & (x <= self.high))
+
+
+def observation_box(params: EnvParams, context: Context) -> Box:
+    """Of :meth:`attjax.AttitudeEnv.observation_space`."""
+    moments = rigid_body.principal_moments(params.inertia)
+    torque = context.largest_torque
+    if context.continuous:
+        torque = jnp.linalg.norm(largest_torques(context.torque_table))
+    kick = torque * context.torque_duration / jnp.min(moments)
+    rate = (params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))
+    one = jnp.ones_like(rate)
+    high = jnp.stack([one] * 4 + [context.kinematic_factor * rate] * 4 + [rate] * 3)
+    return Box(-high, high)
