@@ -11,9 +11,8 @@ from attjax.control.covariance import product
 from attjax.control.linearized import AXES
 from attjax.control.response import Identity, Period
 from attjax.control.square_root import times
-from attjax.dynamics import rigid_body, vectors
+from attjax.dynamics import vectors
 from attjax.dynamics.actuators import Queue
-from attjax.envs import observation as observations
 from attjax.envs.context import Context
 from attjax.envs.torques import applied_torque
 
@@ -117,28 +116,6 @@ def _along(table, queue):
     return Queue(queue.starts, found)
 
 
-def leaned(observation: chex.Array, torque: Any, context: Context) -> chex.Array:
-    """The observation (11,) that a controller must be shown to hold against a constant torque d.
-
-    It takes out what it is shown by impulses at once, and so holds a target where it is shown 0 on
-    average. A torque of the duration τ that undoes d in each period T leaves the attitude where it
-    is if the rate is N d T (½ − τ/2T) when it begins; shown N d T, it asks for that torque.
-
-    Args:
-        observation: (11,) Eq. 11, as estimated.
-        torque: d, three components, N m; None: there is none.
-        context: as believed.
-    """
-    if torque is None:
-        return observation
-    share = (1 + context.torque_duration / context.control_period) / 2
-    turning = rigid_body.inverse(context.inertia)
-    pushed = jnp.matmul(turning, jnp.stack(torque), precision="highest")
-    rate = observation[observations.ANGULAR_VELOCITY] + share * context.control_period * pushed
-    rules = context.kinematic_factor, context.observes_quaternion_rate
-    return observations.observe(observation[observations.QUATERNION], rate, *rules)
-
-
 def begun(identity: Identity, estimate: Any) -> Identity:
     """The identity with the first rate that was measured.
 
@@ -169,7 +146,7 @@ def identified(
     impulses = tuple(jnp.sum(durations[:, None] * queue.torques, axis=0))
     steps = jnp.asarray(belief.rk4_steps(context), context.inertia.dtype)
     numbers = measured.innovations(predicted, expected, told, noise)[:3]
-    floor = _least_change(model, context) ** 2
+    floor = least_change(model, context) ** 2
     numbers = [x._replace(variance=x.variance + floor) for x in numbers]
     before, after = estimate.angular_velocity, predicted.angular_velocity
     period = Period(before, after, impulses, _unexplained(estimate, model, steps))
@@ -183,7 +160,7 @@ def identified(
     return identity, predicted.replace(covariance=spread)
 
 
-def _least_change(model, context):
+def least_change(model: linearized.Model, context: Context) -> chex.Array:
     """RESOLVED of the least that a command changes the rate by, rad/s."""
     sizes = jnp.linalg.norm(context.torque_table, axis=1)
     weakest = jnp.min(jnp.where(sizes > 0, sizes, jnp.inf))

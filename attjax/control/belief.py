@@ -62,14 +62,29 @@ def one_period(estimate: Any, queue: Queue, time: chex.Array, context: Context) 
     return _moved(estimate, queue, context, (agent_step, limit, samples))
 
 
-def after_delay(estimate: Any, queue: Queue, context: Context) -> Motion:
-    """The motion until the torque begins that is commanded now.
+def after_delay(
+    estimate: Any, queue: Queue, context: Context, delay: chex.Array | None = None
+) -> Any:
+    """The motion, or the estimate, where the torque begins that is commanded now.
 
     Args:
         estimate, queue, context: as of :func:`one_period`.
+        delay: RK4 steps, a number of the inertia's type; None: the delay that is known.
     """
-    agent_step = context.agent_step._replace(frameskip=context.knowledge.delay - 1)
-    return _moved(estimate, queue, context, (agent_step, None, (None, None)))
+    known = context.knowledge
+    if delay is None:
+        agent_step = context.agent_step._replace(frameskip=known.delay - 1)
+        return _moved(estimate, queue, context, (agent_step, None, (None, None)))
+    assert known.delays is not None
+    agent_step = context.agent_step._replace(frameskip=known.delays[1] - 1)
+    moved = _moved(estimate, queue, context, (agent_step, delay - 1, (None, None)))
+    states = zip((moved.quaternion, moved.angular_velocity), _state(estimate))
+    attitude, rate = (vectors.chosen(delay > 0, *both) for both in states)
+    return moved._replace(quaternion=attitude, angular_velocity=rate)
+
+
+def _state(estimate):
+    return estimate.quaternion, estimate.angular_velocity
 
 
 def _moved(estimate, queue, context, step):

@@ -100,13 +100,17 @@ def predicted(
         model = linearized.model(queue, context)
         spread = together(linearized.covariance_after, estimate, motion, model)
         later = later.replace(covariance=spread)
-    return later, _expected(expected, motion, time, context)
+    return later, expected_after(expected, motion, time, context)
 
 
-def _expected(expected, motion, time, context):
+def expected_after(
+    expected: Expected, motion: belief.Motion, time: chex.Array, context: Context
+) -> Expected:
+    """What is expected of the sensors after a motion; arguments as of :func:`predicted`."""
     expected = expected.replace(rate=motion.sampled_rate)
     if expected.turn is None:
         return expected
+    assert expected.waiting is not None and context.knowledge.attitude is not None
     clock = context.knowledge.attitude.clock
     start, now = (n * belief.rk4_steps(context) for n in (time, time + 1))
     told = clock.newest_told(start, now)

@@ -3,6 +3,7 @@
 In the ideal world, where the truth is told and torques come at once, it is the controller alone.
 """
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -11,35 +12,14 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from attjax.control import adaptation, belief, estimator, response
+from attjax.control import adaptation, belief, estimator, lateness
 from attjax.control.assured import Assurance, ranking
-from attjax.control.estimator import Estimate, Expected
-from attjax.control.response import Identity
+from attjax.control.memory import Memory, unknowing
 from attjax.dynamics import vectors
-from attjax.dynamics.actuators import Queue, empty_queue
 from attjax.dynamics.sensing import Measurement
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
-
-
-class Memory(struct.PyTreeNode):
-    """What a flight loop remembers from one decision to the next.
-
-    Attributes:
-        estimate: at the last decision.
-        expected: of sensors that sample between decisions.
-        queue: of the torques that were commanded.
-        time: decisions so far, int32.
-        has_begun: whether one of them was here.
-        identity: of the spacecraft; None: it is taken to be as believed.
-    """
-
-    estimate: Estimate
-    expected: Expected
-    queue: Queue
-    time: chex.Array
-    has_begun: chex.Array
-    identity: Identity | None = None
+from attjax.envs.leaning import leaned
 
 
 class FlightLoop(struct.PyTreeNode):
@@ -71,17 +51,7 @@ class FlightLoop(struct.PyTreeNode):
     def init(self, context: Context) -> Memory | None:
         """The memory before the first decision; None where nothing need be remembered."""
         context = adaptation.filtering(context) if self.adapts else context
-        known = context.knowledge
-        if known.is_truth:
-            return None
-        least_steps = 1 + (0 if context.steps_after is not None else context.agent_step.frameskip)
-        held, dtype = context.agent_step.held, context.inertia.dtype
-        size = 3 if known.wheels is None else len(known.wheels.wheels.axes)
-        size = response.valves_of(context) if self.adapts else size
-        queue = empty_queue(known.delay, least_steps, held, dtype, size)
-        identity = response.unknowing(context) if self.adapts else None
-        new = jnp.zeros((), jnp.int32), jnp.zeros((), bool)
-        return Memory(*estimator.unknowing(context), queue, *new, identity)
+        return None if context.knowledge.is_truth else unknowing(context, self.adapts)
 
     def step(
         self, memory: Memory | None, measurement: Measurement, context: Context
@@ -109,15 +79,21 @@ class FlightLoop(struct.PyTreeNode):
         """
         known, shown = self.believed(memory, context), observation
         if memory is not None and self.adapts:
-            shown = adaptation.leaned(observation, memory.estimate.torque, known)
+            torque = memory.estimate.torque
+            if torque is not None:
+                known = dataclasses.replace(known, disturbance=jnp.stack(torque))
+            shown = leaned(observation, known)
         if self.assurance is None or self.scores is None:
             return self.controller(shown, known)
-        if memory is not None and self.adapts and known.knowledge.delay:
+        looks_ahead = context.knowledge.delay or context.knowledge.delays
+        if memory is not None and self.adapts and looks_ahead:
             estimate = memory.estimate
             if context.knowledge.is_told:  # whose bounds are of any torque, not of one estimated
                 estimate = estimate.replace(torque=None)
-            queue = adaptation.given(memory.queue, context)
-            observation = _ahead(estimate, queue, context)
+            queue = memory.queue
+            if memory.surprises is not None:
+                queue = lateness.delayed(queue, context.knowledge.delay)
+            observation = _ahead(estimate, adaptation.given(queue, context), context)
         return self.assurance.chosen(observation, self.scores(shown, known))
 
     def believed(self, memory: Memory | None, context: Context) -> Context:
@@ -160,7 +136,8 @@ class FlightLoop(struct.PyTreeNode):
 
     def _shown(self, memory, context):
         context = self.believed(memory, context)
-        return _ahead(memory.estimate, _bodily(memory, context), context), memory
+        queue, delay = memory.bodily(context), memory.delay(context)
+        return _ahead(memory.estimate, queue, context, delay), memory
 
     def _begun(self, memory, measurement, context):
         """The memory with the estimate at the first decision."""
@@ -173,12 +150,15 @@ class FlightLoop(struct.PyTreeNode):
     def _estimated(self, memory, measurement, context):
         """The memory with the estimate at any other decision, and the queue seen from it."""
         last, context = memory.time - 1, self.believed(memory, context)
-        before, queue = (memory.estimate, memory.expected), _bodily(memory, context)
+        if memory.surprises is not None:
+            memory = memory.replace(surprises=memory.surprised(measurement, context))
+        before, queue = (memory.estimate, memory.expected), memory.bodily(context)
         predicted, expected = estimator.predicted(*before, queue, last, context)
         identity = memory.identity
         if identity is not None:
             seen = memory.estimate, predicted, expected, estimator.told_by(measurement, context)
-            identity, predicted = adaptation.identified(identity, memory.queue, seen, context)
+            commands = memory.commands(context)
+            identity, predicted = adaptation.identified(identity, commands, seen, context)
         return memory.replace(
             estimate=estimator.corrected(predicted, expected, measurement, context),
             expected=expected,
@@ -192,21 +172,15 @@ class FlightLoop(struct.PyTreeNode):
             return None
         command = belief.commanded_torque if memory.identity is None else adaptation.commanded
         torque = command(action, context)
-        queue = memory.queue.and_then(context.knowledge.delay, torque)
+        delay = context.knowledge.delay if memory.surprises is None else 0
+        queue = memory.queue.and_then(delay, torque)
         return memory.replace(queue=queue, time=memory.time + 1, has_begun=jnp.ones((), bool))
 
 
-def _bodily(memory, context):
-    """The queue of torques about the body's axes, or those of wheels."""
-    if memory.identity is None:
-        return memory.queue
-    return adaptation.bodily(memory.queue, memory.identity, context)
-
-
-def _ahead(estimate, queue, context):
+def _ahead(estimate, queue, context, delay=None):
     """The observation of when the torque begins that is about to be commanded."""
-    if context.knowledge.delay:
-        estimate = belief.after_delay(estimate, queue, context)
+    if context.knowledge.delay or delay is not None:
+        estimate = belief.after_delay(estimate, queue, context, delay)
     return _observation(estimate, context)
 
 
@@ -230,7 +204,8 @@ def flight_loop(
             where there are scores.
         adapts: whether the loop identifies inertia and torques in flight, and flies by them.
         assurance: that stands after it (:func:`attjax.control.assured.assurance`).
-        scores: of all actions for it, as of :func:`attjax.control.assured.assured`.
+        scores: of all actions for it, as of :func:`attjax.control.assured.assured`; without an
+            assurance they are not asked for.
     """
     if isinstance(controller, FlightLoop):
         loop = controller

@@ -5,7 +5,8 @@ from typing import Any
 
 import chex
 
-from attjax.control.flight_loop import FlightLoop, Memory, flight_loop
+from attjax.control.flight_loop import FlightLoop, flight_loop
+from attjax.control.memory import Memory
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.parameters import EnvParams, EnvState, measured
 

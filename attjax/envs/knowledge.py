@@ -15,6 +15,7 @@ from attjax.dynamics.moving_parts import Motors, Wheels
 from attjax.dynamics.vectors import Vector
 from attjax.envs.doubt import Doubt, deviation_from_one, doubt
 from attjax.envs.sensors import ALLAN_TOP, ARCSEC, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, PPM, clock_of
+from attjax.envs.torque_bounds import high, low
 from attjax.envs.torque_noise import TorqueNoise, torque_noise
 from attjax.spacecraft import INTEGRATION_STEP
 from attjax.world import World
@@ -89,7 +90,9 @@ class Knowledge(struct.PyTreeNode):
         inertia: of a moment of inertia, as a share of it.
         wheels: None: it has none.
         doubt: of inertia and torque axes, effect by effect.
-        delay: from a command to its torque, RK4 steps; known when it is compiled.
+        delay: from a command to its torque, RK4 steps, on average; known when it is compiled.
+        delays: least and most of it, where each episode has another; None: it is always the same,
+            or another for each command.
         is_filtered: whether what is told is filtered even where it is the truth.
     """
 
@@ -102,6 +105,7 @@ class Knowledge(struct.PyTreeNode):
     wheels: KnownWheels | None = None
     doubt: Doubt = Doubt()
     delay: int = struct.field(pytree_node=False, default=0)
+    delays: tuple[int, int] | None = struct.field(pytree_node=False, default=None)
     is_filtered: bool = struct.field(pytree_node=False, default=False)
 
     @property
@@ -140,7 +144,7 @@ def knowledge(
     delay = _delay(world.actuators)
     torque, wrong = torque_noise(world, inertia, period), doubt(world)
     wheels = _wheels(world.wheels, axes)
-    if tracker is None and gyro is None and delay == 0:
+    if tracker is None and gyro is None and delay == 0 and _delays(world.actuators) is None:
         return Knowledge(torque=torque, wheels=wheels, doubt=wrong)
     inertia_error = _inertia_error(world.uncertainty)
     along, across = _torque_errors(world.actuators)
@@ -154,6 +158,7 @@ def knowledge(
         wheels=wheels,
         doubt=wrong,
         delay=delay,
+        delays=_delays(world.actuators),
     )
 
 
@@ -178,6 +183,13 @@ def _delay(actuators):
     if actuators is None:
         return 0
     return round(moments(actuators.delay)[0] + moments(actuators.delay_jitter)[0])
+
+
+def _delays(actuators):
+    if actuators is None or actuators.delay_jitter != 0:
+        return None
+    ends = tuple(round(end(actuators.delay)) for end in (low, high))
+    return None if ends[0] == ends[1] else ends
 
 
 def _torque_errors(actuators):

@@ -7,7 +7,8 @@ import chex
 import jax
 import jax.numpy as jnp
 
-from attjax.control.flight_loop import FlightLoop, Memory
+from attjax.control.flight_loop import FlightLoop
+from attjax.control.memory import Memory
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import vectors
 from attjax.envs import parameters

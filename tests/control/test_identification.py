@@ -1,7 +1,5 @@
 """Identification: derivatives, exact where the truth is told, careful where nothing moves."""
 
-import dataclasses
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,7 +9,6 @@ from worlds import world
 from attjax import AttitudeEnv, Spacecraft, flight_loop
 from attjax.control import adaptation, belief, linearized, response
 from attjax.control.response import PAIRS, Period
-from attjax.envs import observation as observations
 from attjax.envs.parameters import measured
 
 TENSOR = ((0.9, 0.02, 0.01), (0.02, 0.5, -0.03), (0.01, -0.03, 0.8))
@@ -178,23 +175,6 @@ def test_in_a_world_that_is_as_believed_nothing_changes():
     env = AttitudeEnv(5, world=world())
     _, _, path = flown(env, 200)
     np.testing.assert_allclose(path, path[:1].repeat(len(path), axis=0), rtol=1e-6)
-
-
-def test_a_constant_torque_is_leaned_against():
-    """Shown N d T, a controller asks for −d T; a held one for as much all the time."""
-    env = AttitudeEnv(5, world=world())
-    context = env.context(env.default_params)
-    torque = tuple(jnp.array([1e-3, -2e-3, 3e-3]))
-    still = observations.observe(jnp.array([0.0, 0.0, 0.6, 0.8]), jnp.zeros(3))
-    for duration, share in ((context.control_period, 1.0), (0.0, 0.5)):
-        known = dataclasses.replace(
-            context, inertia=jnp.diag(context.inertia), torque_duration=duration
-        )
-        found = adaptation.leaned(still, torque, known)
-        wanted = share * context.control_period * jnp.stack(torque) / context.inertia
-        np.testing.assert_allclose(found[8:], wanted, rtol=1e-5)
-        np.testing.assert_allclose(found, observations.observe(still[:4], found[8:]))
-    np.testing.assert_array_equal(adaptation.leaned(still, None, context), still)
 
 
 def test_wheels_are_refused():
