@@ -22,6 +22,22 @@ def fastest(observation: chex.Array, context: Context) -> chex.Array:
     return rigid_body.peak_rate(_after(observation, context), context.inertia)
 
 
+def hesitating(observation: chex.Array, context: Context) -> chex.Array:
+    """(actions,) scores: the largest torques that raise the rate, and else a weaker one against it.
+
+    Where it is not known whether the last torque has come yet, a small one against the rate that is
+    counted twice makes room for a large one.
+
+    Args:
+        observation, context: as of :func:`fastest`.
+    """
+    rate = observation[observations.ANGULAR_VELOCITY]
+    gained = fastest(observation, context) - rigid_body.peak_rate(rate, context.inertia)
+    sizes = jnp.linalg.norm(context.torque_table, axis=1)
+    is_large = sizes > 0.99 * context.largest_torque
+    return jnp.where(is_large == (gained > 0), 1 + jnp.abs(gained), -jnp.abs(gained))
+
+
 def into_cones(cones: Cones, observation: chex.Array, context: Context) -> chex.Array:
     """(actions,) scores: the faster an action turns the nearest axis into its cone, the better.
 

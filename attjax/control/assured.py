@@ -79,13 +79,10 @@ class Assurance(struct.PyTreeNode):
         return peak**2, 2 * self.plants.work(rate) + beside
 
     def admissible(self, quaternion: chex.Array, rate: chex.Array) -> chex.Array:
-        """Which actions are let through.
+        """Which actions are let through: (actions,) bool, at least one of them true.
 
         Args:
             quaternion, rate: (4,) and (3,), as told, of when the torque begins.
-
-        Returns:
-            (actions,) bool, at least one of them true.
         """
         squared, change = self.changes(rate)
         keeps = (squared + change <= self.limit**2) | (change <= 0)
@@ -166,8 +163,7 @@ def _errors(of_these, context, within, limit):
     """Of rate, rad/s, and attitude, rad, when a torque begins, of an action that is decided now."""
     delay = context.knowledge.delay * INTEGRATION_STEP
     late, (rate_wait, attitude_wait) = within.late * INTEGRATION_STEP, within.waits
-    steps = context.control_period
-    pushed = of_these.pushed / context.control_period
+    steps, pushed = context.control_period, of_these.pushed / context.control_period
     is_off = within.factors != (1.0, 1.0) or within.turned > 0
     turning = 2 * MOST_TURNING * limit**2
     if within.wheels is not None:
@@ -178,8 +174,12 @@ def _errors(of_these, context, within, limit):
     count = jnp.ceil(unknown / steps - 1e-3) + (1 if context.agent_step.held and unknown else 0)
     share = jnp.max(jnp.abs(of_these.share - 1), axis=0) + of_these.share[1] * of_these.tilt
     sizes = jnp.sqrt(jnp.sum(of_these.impulse**2, axis=-1))
-    kick = of_these.inverse * jnp.max(share * sizes + jnp.asarray(within.offset))
-    error = within.rate + unknown * astray + count * kick
+
+    def kick(shares):
+        return of_these.inverse * jnp.max(shares * sizes + jnp.asarray(within.offset))
+
+    error = within.rate + unknown * astray + count * kick(share)
+    error = error + within.uncounted * kick(of_these.share[1])
     error = error * jnp.exp(2 * limit * unknown)
     error = error + late * (MOST_TURNING * limit**2 + pushed) + 1e-6 * limit
     at_angle = within.attitude + (attitude_wait + delay) * error + late * limit

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from attjax.envs.context import Context
+from attjax.envs.delay_bounds import check_order, late, uncounted
 from attjax.envs.sensors import ARCSEC, PPM
 from attjax.envs.torque_bounds import (
     DEVIATIONS,
@@ -53,6 +54,8 @@ class Bounds(NamedTuple):
         offset: (actions,) N m s, the most that it can be off beside that.
         disturbance: the largest torque that nobody commands, N m.
         late: RK4 steps that a torque can come earlier or later than is believed.
+        uncounted: torques at most of which it can be wrong whether they have come when another one
+            begins; of held ones, the share of one.
         rate: the largest error of the rate that is told or estimated, rad/s.
         attitude: the same of the attitude, rad.
         waits: s between two samples of the rate, and from what the star tracker sees to when the
@@ -68,6 +71,7 @@ class Bounds(NamedTuple):
     offset: np.ndarray
     disturbance: float
     late: float
+    uncounted: float
     rate: float
     attitude: float
     waits: tuple[float, float]
@@ -109,7 +113,8 @@ def bounds(world: World, spacecraft: Spacecraft, context: Context) -> Bounds:
         tilt=_tilt(world),
         offset=offset,
         disturbance=torque,
-        late=_late(world, context),
+        late=late(world, context),
+        uncounted=uncounted(world, context),
         rate=_rate_error(world, context, spacecraft),
         attitude=_attitude_error(context),
         waits=_waits(context),
@@ -134,12 +139,7 @@ def _check_covered(world, context):
             f"assurance needs a gyro that sees the rate limit, {float(context.rate_limit):g} "
             f"rad/s; sensors.gyro.rate_limit is {limit:g}"
         )
-    late = _late(world, context) * INTEGRATION_STEP
-    if late >= float(context.control_period):
-        raise ValueError(
-            f"assurance needs a delay that is known to within a control period, "
-            f"{float(context.control_period):.4g} s; this is by up to {late:.4g} s another one"
-        )
+    check_order(world, context)
 
 
 def _tensor(spacecraft):
@@ -192,7 +192,7 @@ def _impulses(world, spacecraft, context, wheels):
         offset += wheels.share * sizes * largest * duration
     least, offset = np.where(nothing, 0, least), np.where(sizes > 0, offset, 0)
     if context.agent_step.held:  # one that ends late is in the next period, whatever comes there
-        offset += 2 * _late(world, context) * INTEGRATION_STEP * np.max(sizes * largest)
+        offset += 2 * late(world, context) * INTEGRATION_STEP * np.max(sizes * largest)
     return np.stack([least, largest]), offset
 
 
@@ -204,15 +204,6 @@ def _tilt(world):
 def _largest_of(sizes, axis):
     """Of each action, the largest torque about its axis."""
     return np.array([np.max(sizes[axis == x]) for x in axis])
-
-
-def _late(world, context):
-    given, believed = world.actuators, context.knowledge.delay
-    if given is None:
-        return 0.0
-    numbers = given.delay, given.delay_jitter
-    ends = (sum(end(x) for x in numbers) for end in (low, high))
-    return max(abs(round(end) - believed) for end in ends)
 
 
 def _rate_error(world, context, spacecraft):

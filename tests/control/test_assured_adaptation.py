@@ -1,5 +1,7 @@
 """Assurance after a loop that adapts: of what was believed before the flight, and told so."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +13,7 @@ from attjax.control import adaptation, adversaries, belief
 from attjax.control.assured import assurance
 from attjax.control.classical import phase_plane
 from attjax.envs import observation as observations
+from attjax.envs.leaning import leaned
 from attjax.envs.parameters import measured
 from attjax.evaluation.limits import limits, nearness
 
@@ -22,6 +25,8 @@ TURNED = world(
     uncertainty={"axes_turned_deg": 10, "change_factor": 1.5, "change_time": 2.0},
     actuators={"gain": {"uniform": [0.9, 1.1]}, "misalignment_deg": 10, "delay": 3},
 )
+
+LATE = world(actuators={"delay": {"uniform": [0, 12]}})
 
 
 def begun(env, steps=30):
@@ -40,9 +45,10 @@ def begun(env, steps=30):
     return memory, state, context
 
 
-def test_an_adversary_that_knows_what_is_identified_passes_no_limit():
-    """Axes and torques turned, a delay, and a mass that comes in mid-flight."""
-    env = AttitudeEnv(5, spacecraft=Spacecraft(duration=8.0), world=TURNED)
+@pytest.mark.parametrize("flown_in", [TURNED, LATE], ids=["turned", "late"])
+def test_an_adversary_that_knows_what_is_identified_passes_no_limit(flown_in):
+    """Axes and torques turned, a delay, and a mass that comes in mid-flight; any delay."""
+    env = AttitudeEnv(5, spacecraft=Spacecraft(duration=8.0), world=flown_in)
     of_this, within = assurance(env), limits(env)
     assert of_this.is_certain
     scores = PARTIAL(adversaries.fastest)
@@ -70,7 +76,7 @@ def test_it_is_told_the_rate_as_it_is_not_leaned():
     of_this = assurance(env)
     observation = observations.observe(jnp.array([0.0, 0, 0, 1]), jnp.array([0.0, 0.4985, 0.0]))
     known = flight_loop(phase_plane, adapts=True).believed(memory, context)
-    shown = adaptation.leaned(observation, pushed, known)
+    shown = leaned(observation, dataclasses.replace(known, disturbance=jnp.stack(pushed)))
     assert shown[9] < 0.45
     up = 3  # 0.5 N m about y
     assert not of_this.admissible(observation[:4], observation[8:])[up]

@@ -119,8 +119,15 @@ def test_of_commands_that_may_do_nothing():
 def test_of_delays_and_of_distributions_without_end():
     _, late = bounded(world(actuators={"delay": {"uniform": [2, 6]}}))
     assert late.late == 2
+    # At 6 RK4 steps a period: one command of those that are a period old, or none, or two.
+    delays = {(0, 5): 0, (2, 6): 1, (4, 8): 1, (6, 11): 0, (0, 12): 1, (0, 20): 2}
+    for (least, largest), uncounted in delays.items():
+        _, late = bounded(world(actuators={"delay": {"uniform": [least, largest]}}))
+        assert late.uncounted == uncounted
+    _, late = bounded(world(actuators={"delay": 5, "delay_jitter": {"uniform": [0, 2]}}))
+    assert late.uncounted == 1
     _, ideal = bounded(World())
-    assert ideal.disturbance == ideal.late == ideal.rate == ideal.turned == 0
+    assert ideal.disturbance == ideal.late == ideal.rate == ideal.turned == ideal.uncounted == 0
     assert np.all(ideal.share == 1) and np.all(ideal.offset == 0)
     assert low(Normal(1.0, 0.1)) == pytest.approx(0.5) and high(Normal(1.0, 0.1)) == 1.5
     assert most(Uniform(-3, 2)) == 3 and most(0.5) == 0.5
@@ -147,5 +154,5 @@ def test_a_held_torque_that_comes_late_is_in_the_next_period():
     craft = Spacecraft(torque_held=True, torque_levels=(0.05,))
     env = AttitudeEnv(5, spacecraft=craft, world=world(actuators={"delay": {"uniform": [0, 2]}}))
     within = bounds(env.world, craft, env.context(env.default_params))
-    assert within.late == 1
+    assert within.late == 1 and within.uncounted == pytest.approx(1 / 6)
     assert within.offset.tolist() == pytest.approx([2 / 240 * 0.05] * 7)
