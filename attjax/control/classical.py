@@ -6,6 +6,7 @@ impulse itself, as far as the torques can give it.
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import chex
 import jax.numpy as jnp
@@ -18,20 +19,28 @@ from attjax.envs import observation as observations
 from attjax.envs import torques
 from attjax.envs.context import Context
 
-BRAKING_MARGIN = 0.75
-"""Share of the available deceleration that the braking curve counts on."""
 
-TERMINAL_GAIN = 0.5
-"""Share of the remaining angle that the phase-plane controller covers in a control period."""
+class Gains(NamedTuple):
+    """Of both laws.
 
-FEEDBACK_BANDWIDTH = 1.8
-"""Bandwidth of the quaternion feedback, in units of the slowest braking rate (see there)."""
+    Attributes:
+        braking_margin: η, the share of the available deceleration that the braking curve counts on.
+        terminal_gain: share of the remaining angle that the phase-plane controller covers in a
+            control period.
+        bandwidth: of the quaternion feedback, in units of the slowest braking rate (see there).
+        rate_margin: largest wanted rate, as a share of the rate limit.
+    """
 
-RATE_MARGIN = 0.9
-"""Largest wanted rate, as a share of the rate limit."""
+    braking_margin: chex.Numeric = 0.75
+    terminal_gain: chex.Numeric = 0.5
+    bandwidth: chex.Numeric = 1.8
+    rate_margin: chex.Numeric = 0.9
 
 
-def phase_plane(observation: chex.Array, context: Context) -> chex.Array:
+GAINS = Gains()
+
+
+def phase_plane(observation: chex.Array, context: Context, gains: Gains = GAINS) -> chex.Array:
     """Follow the braking curve along the rotation to the goal.
 
     With the impulses shared among the axes so that all arrive together, the angle |θ| that
@@ -44,6 +53,7 @@ def phase_plane(observation: chex.Array, context: Context) -> chex.Array:
     Args:
         observation: (11,) Eq. 11.
         context: the spacecraft and its actions.
+        gains: of the law.
 
     Returns:
         The action: an integer scalar, or (3,) fractions where the context says so.
@@ -52,12 +62,16 @@ def phase_plane(observation: chex.Array, context: Context) -> chex.Array:
     angle = quaternions.rotation_vector(observation[observations.QUATERNION])
     angle = context.integral_of_rate(angle)
     momentum = momentum_to_give(angle, context)
-    braking = jnp.sqrt(2 * BRAKING_MARGIN * average_torque(context) / jnp.maximum(momentum, 1e-12))
-    gain = jnp.minimum(braking, TERMINAL_GAIN / context.control_period)
-    return nearest_action(-gain * angle, observation, context)
+    braking = jnp.sqrt(
+        2 * gains.braking_margin * average_torque(context) / jnp.maximum(momentum, 1e-12)
+    )
+    gain = jnp.minimum(braking, gains.terminal_gain / context.control_period)
+    return nearest_action(-gain * angle, observation, context, gains.rate_margin)
 
 
-def quaternion_feedback(observation: chex.Array, context: Context) -> chex.Array:
+def quaternion_feedback(
+    observation: chex.Array, context: Context, gains: Gains = GAINS
+) -> chex.Array:
     """Quaternion-rate feedback (PD): M = −I (2 λ q_v sign(q_s) + ω) / Δt.
 
     The derivative gain, one over the control period Δt, takes the rate error out in one
@@ -69,9 +83,10 @@ def quaternion_feedback(observation: chex.Array, context: Context) -> chex.Array
     sign = jnp.where(quaternion[3] < 0, -1.0, 1.0).astype(quaternion.dtype)
     largest = jnp.max(rigid_body.principal_moments(context.inertia))
     half_turn = context.integral_of_rate(jnp.pi)
-    bandwidth = FEEDBACK_BANDWIDTH * jnp.sqrt(average_torque(context) / (half_turn * largest))
+    bandwidth = gains.bandwidth * jnp.sqrt(average_torque(context) / (half_turn * largest))
     vector = context.integral_of_rate(quaternion[:3])
-    return nearest_action(-2 * bandwidth * sign * vector, observation, context)
+    wanted = -2 * bandwidth * sign * vector
+    return nearest_action(wanted, observation, context, gains.rate_margin)
 
 
 def average_torque(context: Context) -> chex.Array:
@@ -92,15 +107,18 @@ def momentum_to_give(angle: chex.Array, context: Context) -> chex.Array:
 
 
 def nearest_action(
-    wanted_rate: chex.Array, observation: chex.Array, context: Context
+    wanted_rate: chex.Array,
+    observation: chex.Array,
+    context: Context,
+    rate_margin: chex.Numeric = GAINS.rate_margin,
 ) -> chex.Array:
     """The action whose impulse is nearest to I (wanted rate − ω), for a (3,) wanted rate.
 
-    The wanted rate is first scaled back to within the rate limit's margin. Of continuous actions it
-    is that impulse, about each axis as far as the torque can give it.
+    The wanted rate is first scaled back to within the margin of the rate limit. Of continuous
+    actions it is that impulse, about each axis as far as the torque can give it.
     """
     rate = jnp.sqrt(squared_norm(wanted_rate))
-    scale = jnp.minimum(1.0, RATE_MARGIN * context.rate_limit / jnp.maximum(rate, 1e-12))
+    scale = jnp.minimum(1.0, rate_margin * context.rate_limit / jnp.maximum(rate, 1e-12))
     change = wanted_rate * scale - observation[observations.ANGULAR_VELOCITY]
     impulse = rigid_body.angular_momentum(context.inertia, change)
     if context.continuous:

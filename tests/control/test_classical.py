@@ -49,6 +49,28 @@ def test_controllers_take_the_shorter_way(controller):
         assert act(controller, quaternion, rate) == act(controller, -quaternion, rate)
 
 
+@pytest.mark.parametrize("controller", classical.CONTROLLERS.values())
+def test_gains_are_the_laws_own(controller):
+    """Each gain of one law changes what it does; those of the other do not."""
+    gains = {"braking_margin": 0.2, "terminal_gain": 0.1, "bandwidth": 0.4, "rate_margin": 0.3}
+    mine = {"rate_margin"} | (
+        {"bandwidth"} if controller is classical.quaternion_feedback else {*gains} - {"bandwidth"}
+    )
+    turns, shares = np.meshgrid(np.geomspace(1e-4, 2, 20), np.linspace(-4, 0, 40))
+    rates = jnp.asarray(np.outer((turns * shares).ravel(), [1, 0, 0]), float)
+    ones = np.outer(np.sin(turns / 2).ravel(), [1, 0, 0])
+    attitudes = jnp.asarray(np.column_stack([ones, np.cos(turns / 2).ravel()]), float)
+
+    def actions(gains):
+        told = jax.vmap(observation.observe)(attitudes, rates)
+        return np.asarray(jax.vmap(lambda x: controller(x, CONTEXT, gains))(told))
+
+    usual = actions(classical.GAINS)
+    for name, value in gains.items():
+        others = actions(classical.Gains(**{name: value}))
+        assert np.any(usual != others) == (name in mine), name
+
+
 def test_nearest_action_by_brute_force():
     rng = np.random.default_rng(2)
     table, inertia = np.asarray(CONTEXT.torque_table), np.asarray(CONTEXT.inertia)
