@@ -110,7 +110,7 @@ def policies(condition: Condition, cones: Any) -> dict:
     import jax
 
     from attjax.control import adversaries
-    from attjax.runs.flight import policy_scores
+    from attjax.runs.flight import network
 
     partial = jax.tree_util.Partial
     found = {
@@ -120,7 +120,8 @@ def policies(condition: Condition, cones: Any) -> dict:
     if cones is not None:
         found["into the cones"] = partial(adversaries.into_cones, cones)
     if condition.name.startswith(FAST):
-        found["precise"] = policy_scores(PRETRAINED)
+        policy, params = network(PRETRAINED)
+        found["precise"] = partial(policy.scores, params)
     return found
 
 

@@ -157,40 +157,38 @@ def flown(
     """
     from attjax.control.assured import assured
     from attjax.control.flight_loop import flight_loop
-    from attjax.runs import checkpoint, flight
 
-    controller, scores = _controller(name, arguments, env, config), None
+    controller, scores = _controller(name, arguments, env, config)
     if arguments.robustness:  # which flies each in every way
         return controller
-    if assurance is not None and name == POLICY and not arguments.sampled:
-        update = checkpoint.best(arguments.checkpoint) if arguments.best else None
-        scores = flight.policy_scores(arguments.checkpoint, update)
     if arguments.bare:
         return controller if assurance is None else assured(controller, assurance, scores)
     return flight_loop(controller, adapts=arguments.adaptive, assurance=assurance, scores=scores)
 
 
 def _controller(name, arguments, env, config):
+    """It, and the scores of its actions; None where it has none."""
     import jax
 
-    from attjax.control import classical, own_units
-    from attjax.runs import checkpoint
+    from attjax.control import classical, torque_order
+    from attjax.runs import flight
 
     if name != POLICY:
-        return jax.tree_util.Partial(classical.CONTROLLERS[name])
+        return jax.tree_util.Partial(classical.CONTROLLERS[name]), None
     folder, trained_on = arguments.checkpoint, config.spacecraft
     is_universal = config.settings.network.is_universal
     if is_universal:
         with errors.one_line_errors(ValueError):
-            own_units.check_axes(env.spacecraft)
+            torque_order.check_axes(env.spacecraft)
     is_tied = env.actions == "discrete" and not is_universal
     if is_tied and trained_on.num_actions != env.num_actions:
         raise errors.UserError(
             f"{arguments.spacecraft} has {env.num_actions} actions; the policy in {folder} "
             f"chooses among {trained_on.num_actions}"
         )
-    update = checkpoint.best(folder) if arguments.best else None
+    policy, params = flight.network(folder, use_best=arguments.best, adapts=arguments.adaptive)
     if arguments.sampled:
-        policy, params = checkpoint.restore_network(folder, update)
-        return jax.tree_util.Partial(policy.draw, params, jax.random.key(arguments.seed or 0))
-    return checkpoint.restore_policy(folder, update)
+        key = jax.random.key(arguments.seed or 0)
+        return jax.tree_util.Partial(policy.draw, params, key), None
+    act, scores = (jax.tree_util.Partial(x, params) for x in (policy.act, policy.scores))
+    return act, scores

@@ -128,7 +128,7 @@ def _flight_policy(arguments):
 
 def _spacecraft(arguments, config):
     """What the policy is to fly; of a universal one with its torques in the policy's order."""
-    from attjax.control import own_units
+    from attjax.control import torque_order
 
     is_universal, file = config.settings.network.is_universal, arguments.spacecraft
     if file is not None and not is_universal:
@@ -137,7 +137,7 @@ def _spacecraft(arguments, config):
             f"{config.spacecraft} alone"
         )
     craft = config.spacecraft if file is None else toml.read_spacecraft(file)
-    return own_units.in_order(craft) if is_universal else craft
+    return torque_order.in_order(craft) if is_universal else craft
 
 
 @contextlib.contextmanager

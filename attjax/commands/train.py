@@ -33,8 +33,11 @@ def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     groups = {name: parser.add_argument_group(title) for name, title in fields.GROUPS.items()}
     remarks = "; ".join(presets.REMARKS.values()).replace("%", "%%")
     default = run_config.DEFAULT_PRESET
-    preset_help = f"the recipe; flags override it; {remarks} (default: {default})"
-    groups["run"].add_argument("--preset", choices=presets.PRESETS, help=preset_help)
+    names = ", ".join(presets.PRESETS)
+    preset_help = f"the recipe: {names}; flags override it; {remarks} (default: {default})"
+    groups["run"].add_argument(
+        "--preset", choices=presets.PRESETS, metavar="NAME", help=preset_help
+    )
     craft_help = "TOML file that describes the spacecraft and its task (default: LM50, the paper's)"
     groups["task"].add_argument(
         "--spacecraft", type=command_line.path, metavar="FILE", help=craft_help

@@ -39,13 +39,14 @@ def meaning(field: dataclasses.Field) -> str:
 
 
 def defaults(name: str) -> str:
-    """A setting's value in the presets, once where they agree.
+    r"""A setting's value in the presets, once where they agree.
 
     Example:
         >>> defaults("clip")
         'default: 0.2'
-        >>> defaults("discount")
-        'precise, precise-gpu, universal, continuous: 0.995; paper, paper-gae, paper-fast: 0.99'
+        >>> print(*defaults("discount").split("; "), sep="\n")
+        precise, precise-gpu, universal, two-torques, continuous: 0.995
+        paper, paper-gae, paper-fast: 0.99
     """
     presets_of: dict[str, list[str]] = {}
     for preset, values in presets.PRESETS.items():

@@ -13,6 +13,7 @@ PAPER = Settings(
         near_goal_steps=32,
         stagger_episodes=False,
         any_spacecraft=False,
+        crippled_share=0.0,
         in_flight_loop=False,
         kinematic_factor=0.5,
         observes_quaternion_rate=True,
@@ -88,6 +89,7 @@ PRECISE = Settings(
         near_goal_steps=32,
         stagger_episodes=True,
         any_spacecraft=False,
+        crippled_share=0.0,
         in_flight_loop=False,
         kinematic_factor=0.5,
         observes_quaternion_rate=True,
@@ -126,9 +128,17 @@ On CPU it comes out as precise and settles 1 % later (docs/tuning.md); Table 2 i
 """
 
 UNIVERSAL = PRECISE.replace(
-    any_spacecraft=True, features="universal", hidden_sizes=(128, 128), max_episode_steps=800
+    any_spacecraft=True,
+    reward="way",
+    features="universal",
+    hidden_sizes=(128, 128),
+    max_episode_steps=800,
+    total_steps=60_000_000,
 )
 """``precise`` for any spacecraft with three torque axes: one policy that sees what it flies."""
+
+TWO_TORQUES = UNIVERSAL.replace(crippled_share=1.0, total_steps=20_000_000)
+"""``universal`` for what is left of such a spacecraft when the torques about one axis are dead."""
 
 CONTINUOUS = PRECISE.replace(
     num_envs=2048, actions="continuous", rate_margin=0.96, greedy_share=0.0
@@ -143,6 +153,7 @@ PRESETS = {
     "precise": PRECISE,
     "precise-gpu": PRECISE_GPU,
     "universal": UNIVERSAL,
+    "two-torques": TWO_TORQUES,
     "paper": PAPER,
     "paper-gae": PAPER_GAE,
     "paper-fast": PAPER_FAST,

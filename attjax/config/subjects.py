@@ -26,7 +26,7 @@ class Task(Checked):
         "Eq. 12-13 with terminal rewards, -log10 of the error angle, Eq. 12-13 without the "
         "exponential, as in the authors' public code without and with a price on torque, or "
         "module:function",
-        choices=("paper", "logarithmic", "binary", "authors", "authors-continuous"),
+        choices=("paper", "logarithmic", "way", "binary", "authors", "authors-continuous"),
         or_function=True,
     )
     reward_scale: float = _task("factor on the reward the learner sees", above=0)
@@ -51,6 +51,12 @@ class Task(Checked):
     any_spacecraft: bool = _task(
         "train on spacecraft of every kind, drawn anew every 32 updates, not on the run's own",
         before=False,
+    )
+    crippled_share: float = _task(
+        "share of these spacecraft with the torques about one axis dead",
+        low=0,
+        high=1,
+        before=0.0,
     )
     in_flight_loop: bool = _task(
         "learn on what a flight loop's estimator believes, as it will fly; otherwise on what is "

@@ -7,8 +7,10 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from attjax import checks
-from attjax.control.own_units import OwnUnits, ordered
+from attjax.control.own_units import OwnUnits
 from attjax.control.scales import at_all_scales
+from attjax.control.torque_order import ordered
+from attjax.control.triad import times
 from attjax.envs import observation as observations
 from attjax.envs.context import Context
 
@@ -18,10 +20,13 @@ OWN_SCALES = tuple(4.0**n for n in range(-5, 4))
 SLEW_SCALES = tuple(2.0**n for n in range(-1, 3))
 """Factors of these over a slew's length: of inputs that are about 1 at the start of any slew."""
 
+PUSH_SCALES = tuple(8.0**n * 4 for n in range(3))
+"""Factors of what a constant torque adds to the momentum in a period, in own units."""
+
 PAIRS = (0, 1), (0, 2), (1, 2)
 """Of axes, whose products of inertia the inputs tell."""
 
-CONSTANTS, PRODUCTS, HAND = 14, (3, 4, 5), 13
+CONSTANTS, PRODUCTS, HAND, PUSHES = 24, (3, 4, 5), 13, tuple(range(15, 24))
 """Of the inputs that do not depend on the state: how many, and which change their signs."""
 
 
@@ -45,7 +50,7 @@ class Universal(NamedTuple):
         directions: (3, 3), dimensionless.
         slowness: (3, 3) directions over the rate limit, s/rad.
         lengths: (3,) of a turn of 1 rad about each axis, in control periods.
-        constants: (14,) of the spacecraft and the control rate.
+        constants: (24,) of the spacecraft, the control rate and a constant torque.
     """
 
     of_vector: Array
@@ -83,13 +88,14 @@ def _constants(units):
     root = jnp.sqrt(moments)
     products = jnp.stack([units.shape[i, j] / (root[i] * root[j]) for i, j in PAIRS])
     tenths = 10 * units.period
-    last = jnp.stack([units.duration / units.period, jnp.log(tenths), units.hand])
+    last = [units.duration / units.period, jnp.log(tenths), units.hand, units.is_crippled]
     parts = (
         0.5 * jnp.log(moments / units.period) - 3,
         products,
         0.5 * jnp.log(units.rate_limit * moments) - 2.25,
         0.25 * jnp.log(units.levels) + 0.5,
-        last,
+        jnp.stack([jnp.asarray(x, moments.dtype) for x in last]),
+        *(jnp.tanh(k * units.push) for k in PUSH_SCALES),
     )
     return jnp.concatenate(parts)
 
@@ -107,18 +113,18 @@ def universal_features(
         context: of the spacecraft.
 
     Returns:
-        (99,) features.
+        (109,) features.
     """
     numbers = Universal.of(ordered(context))
     vector, scalar, rate = _state(observation)
     turn = _turn(numbers, vector, rate)
     sign = jnp.where(turn < 0, -1.0, 1.0)
-    own = [abs(turn) / jnp.sqrt(1 + abs(turn)), sign * _times(numbers.momentum, rate)]
+    own = [abs(turn) / jnp.sqrt(1 + abs(turn)), sign * times(numbers.momentum, rate)]
     scaled = jnp.concatenate([*own, *(x / numbers.lengths for x in own)])
     plain = (
-        sign * _times(numbers.directions, vector),
+        sign * times(numbers.directions, vector),
         scalar,
-        sign * _times(numbers.slowness, rate),
+        sign * times(numbers.slowness, rate),
         numbers.constants * signs_of_constants(sign),
     )
     return at_all_scales(scaled, numbers.factors, jnp.concatenate(plain))
@@ -140,7 +146,7 @@ def _state(observation):
 
 def _turn(numbers, vector, rate):
     """(3,) z: of the turn to the goal, in own units."""
-    return _times(numbers.of_vector, vector) + _times(numbers.of_rate, rate)
+    return times(numbers.of_vector, vector) + times(numbers.of_rate, rate)
 
 
 def signs_of_constants(sign: Array) -> Float[Array, "constants"]:
@@ -149,13 +155,5 @@ def signs_of_constants(sign: Array) -> Float[Array, "constants"]:
     before, between = unsigned[: PRODUCTS[0]], unsigned[PRODUCTS[-1] + 1 : HAND]
     products = jnp.stack([sign[i] * sign[j] for i, j in PAIRS])
     hand = sign[0] * sign[1] * sign[2]
-    return jnp.concatenate([before, products, between, hand[None]])
-
-
-def _times(matrix, vector):
-    """Their product, by components: of a batch, jaxlib 0.10.2 sums rows beyond 2¹⁵ numbers wrongly
-    on a CPU (jax-ml/jax issue 39103).
-    """
-    return jnp.stack(
-        [row[0] * vector[0] + row[1] * vector[1] + row[2] * vector[2] for row in matrix]
-    )
+    pushes = [sign] * len(PUSH_SCALES)
+    return jnp.concatenate([before, products, between, hand[None], unsigned[:1], *pushes])

@@ -7,6 +7,8 @@ levels of torque compare. These are drawn; masses, torques and limits in SI unit
 
 from typing import NamedTuple
 
+import chex
+import jax.numpy as jnp
 import numpy as np
 
 from attjax.dynamics import vectors
@@ -45,6 +47,17 @@ of the paper's goal, which else could not be held.
 """
 
 
+PUSHED = 0.1
+"""Share of the spacecraft that are not crippled on which a constant torque acts."""
+
+PUSH = 3e-4, 0.1
+"""Its impulse in a control period, as a share of the largest impulse."""
+
+
+PRINCIPAL = 0.8
+"""Share of the crippled spacecraft whose principal axes are the body's."""
+
+
 class Fleet(NamedTuple):
     """Spacecraft, as in :class:`attjax.EnvParams`, whose torque axes are the body's.
 
@@ -52,11 +65,18 @@ class Fleet(NamedTuple):
         inertia: (count, 3, 3) tensors, kg m².
         torque_table: (count, 19, 3) torques of 1/240 s, N m, in the order of Table 1.
         rate_limit: (count,) rad/s.
+        disturbance: (count, 3) torques that always act, body frame, N m; None: none do.
     """
 
     inertia: np.ndarray
     torque_table: np.ndarray
     rate_limit: np.ndarray
+    disturbance: np.ndarray | None = None
+
+    def parameters(self) -> dict[str, chex.Array]:
+        """By the names of the parameters, in JAX's default floating-point type."""
+        given = {name: x for name, x in self._asdict().items() if x is not None}
+        return {name: jnp.asarray(x, float) for name, x in given.items()}
 
 
 def draw(random: np.random.Generator, frameskips: np.ndarray) -> Fleet:
@@ -83,6 +103,30 @@ def draw(random: np.random.Generator, frameskips: np.ndarray) -> Fleet:
     shares[:, -1] = np.minimum(shares[:, -1], COARSEST / (kick * period))
     levels = impulse[:, None] / INTEGRATION_STEP * shares
     return Fleet(_tensors(random, moments), _tables(levels), limit)
+
+
+def with_faults(
+    random: np.random.Generator, fleet: Fleet, frameskips: np.ndarray, crippled_share: float
+) -> Fleet:
+    """The fleet, some of it with one axis dead, some of the others under a constant torque.
+
+    Args:
+        random: that these are drawn by.
+        fleet: of :func:`draw`.
+        frameskips: (count,) of each.
+        crippled_share: of the spacecraft, those with a dead axis.
+    """
+    count, period = len(frameskips), (np.asarray(frameskips) + 1) * INTEGRATION_STEP
+    table, inertia = fleet.torque_table.copy(), fleet.inertia.copy()
+    impulse = np.max(table, axis=(1, 2)) * INTEGRATION_STEP
+    push = _pushes(random, count) * (impulse / period)[:, None]
+    crippled, axis = random.random(count) < crippled_share, random.integers(0, 3, count)
+    table[crippled, :, axis[crippled]] = 0
+    push[crippled] = 0  # of which there would be none to hold it
+    alone = crippled & (random.random(count) < PRINCIPAL)
+    moments = random.permuted(np.linalg.eigvalsh(inertia[alone]), axis=1)
+    inertia[alone] = moments[:, :, None] * np.eye(3)
+    return fleet._replace(inertia=inertia, torque_table=table, disturbance=push)
 
 
 def principal_moments(random: np.random.Generator, count: int) -> np.ndarray:
@@ -120,6 +164,14 @@ def _level_shares(random, count):
     steps[kind > 1 - FEW, 0] = 1
     steps[kind > 1 - FEW / 2, 1] = 1
     return 1 / np.cumprod(np.column_stack([np.ones(count), steps]), axis=1)
+
+
+def _pushes(random, count):
+    """(count, 3) impulses of constant torques as shares of the largest that is commanded."""
+    direction = random.normal(size=(count, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    sizes = _log_uniform(random, PUSH, (count, 1))
+    return np.where(random.random((count, 1)) < PUSHED, sizes * direction, 0)
 
 
 def _tables(levels):

@@ -68,6 +68,8 @@ def evaluate_fleet(
 def params_of(env: AttitudeEnv, episodes: int, seed: int) -> EnvParams:
     """Parameters of another spacecraft for each slew, drawn as those that ``universal`` trains on.
 
+    Nothing is wrong with any of them.
+
     Args:
         env: whose episodes, goal and control rate they have.
         episodes: how many.
@@ -75,8 +77,7 @@ def params_of(env: AttitudeEnv, episodes: int, seed: int) -> EnvParams:
     """
     random = np.random.default_rng([seed, NEVER_TRAINED])
     drawn = fleet.draw(random, np.full(episodes, env.frameskip))
-    arrays = {name: jnp.asarray(x, float) for name, x in drawn._asdict().items()}
-    return env.default_params.replace(**arrays)
+    return env.default_params.replace(**drawn.parameters())
 
 
 def ratios(

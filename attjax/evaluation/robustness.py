@@ -17,6 +17,7 @@ from attjax.envs.attitude import AttitudeEnv
 from attjax.evaluation.episodes import Episodes, fly_side_by_side
 from attjax.evaluation.flown import Controller
 from attjax.evaluation.ladder import conditions
+from attjax.ppo.crew import Crew
 from attjax.ppo.networks import Policy
 from attjax.spacecraft import LM50
 from attjax.world import World, made_for
@@ -106,7 +107,7 @@ def _flies_any(controller):
 def _policy_of(controller):
     """The policy whose ``act`` it is; None of a classical law."""
     owner = getattr(getattr(controller, "func", None), "__self__", None)
-    return owner if isinstance(owner, Policy) else None
+    return owner if isinstance(owner, Policy | Crew) else None
 
 
 def _flown(controllers, env, flights, name):

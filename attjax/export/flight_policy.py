@@ -68,7 +68,7 @@ class FlightPolicy:
         ):
             raise ValueError(
                 f"{self.env.spacecraft} has torques in another order than the policy; export it "
-                f"for attjax.control.own_units.in_order of it"
+                f"for attjax.control.torque_order.in_order of it"
             )
         arrays = [x for layer in _layers(self.params) for x in (layer.weights, layer.biases)]
         if not all(np.all(np.isfinite(x)) for x in arrays):

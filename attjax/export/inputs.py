@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from attjax.control import features, own_units, universal
+from attjax.control import features, torque_order, universal
 from attjax.control.features import Multiscale
 from attjax.control.universal import Universal
 from attjax.dynamics import quaternion as quaternions
@@ -130,11 +130,12 @@ def _universal_in_c(context):
     counts = {"scales": "scale_values", "slew_scales": "slew_scale_values"}
     counts |= {"constant_count": "constants"}
     values |= {name: str(arrays[of].size) for name, of in counts.items()}
-    values |= {"levels": str(own_units.LEVELS), "pairs": _pairs_in_c()}
-    values |= {"first_product": str(universal.PRODUCTS[0]), "hand": str(universal.HAND)}
+    values |= {"levels": str(torque_order.LEVELS), "pairs": _pairs_in_c()}
+    places = universal.PRODUCTS[0], universal.HAND, universal.PUSHES[0], len(universal.PUSHES)
+    values |= dict(zip(("first_product", "hand", "first_push", "pushes"), map(str, places)))
     constants, tanh = sum(x.size for x in arrays.values()), numbers.factors.shape[1]
     products = 6 * 9 + 3 * 4  # five products of a matrix, a sum of two, and roots
-    signs = 3 * 4 + 3 * 2 + 3
+    signs = 3 * 4 + 3 * 2 + 3 + len(universal.PUSHES)
     other = tanh + 6 * len(universal.SLEW_SCALES) + products + signs
     return CInputs("features_universal.c", values, constants, tanh, other, turns=True)
 
@@ -194,8 +195,9 @@ def _signs_of_constants(graph, sign):
     )
     products = graph.add("Mul", [first, second], "sign_products")
     hand = graph.add("ReduceProd", [sign], "sign_of_hand", axes=[1], keepdims=1)
-    signs = graph.add("Concat", [products, hand], "signs", axis=1)
-    places = np.array([*universal.PRODUCTS, universal.HAND])
+    pushes = [sign] * len(universal.PUSH_SCALES)
+    signs = graph.add("Concat", [products, hand, *pushes], "signs", axis=1)
+    places = np.array([*universal.PRODUCTS, universal.HAND, *universal.PUSHES])
     placed = np.eye(universal.CONSTANTS)[places]
     unsigned = graph.constant("unsigned", 1 - placed.sum(axis=0))
     signs = graph.add("MatMul", [signs, graph.constant("places", placed)], "placed")
@@ -203,9 +205,9 @@ def _signs_of_constants(graph, sign):
 
 
 def _turned_back_in_onnx(graph, outputs):
-    """As own_units.turned_back."""
-    numbers = np.arange(own_units.ACTIONS)
-    axis = graph.constant("axis_of_action", (numbers - 1) // 2 % own_units.AXES)
+    """As torque_order.turned_back."""
+    numbers = np.arange(torque_order.ACTIONS)
+    axis = graph.constant("axis_of_action", (numbers - 1) // 2 % torque_order.AXES)
     opposite = graph.constant("opposite_action", np.where(numbers == 0, 0, (numbers - 1 ^ 1) + 1))
     is_turned = graph.add("Gather", ["backward", axis], "is_turned", axis=1)
     opposite = graph.add("Gather", [outputs, opposite], "opposite", axis=1)

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from attjax.control import assurance, own_units
+from attjax.control import assurance, torque_order
 from attjax.control.features import FEATURES
 from attjax.control.universal import backward_axes
 from attjax.envs import observation as observations
@@ -42,7 +42,7 @@ class Policy:
     Attributes:
         features: of FEATURES by name, or a function of an observation (size,) and a context, to
             (features,). Where they are "universal", actions are numbers of
-            :func:`attjax.control.own_units.rows` until they are commanded.
+            :func:`attjax.control.torque_order.rows` until they are commanded.
         hidden_sizes: neurons of each hidden layer.
         num_actions: how many a categorical policy chooses from.
         rate_margin: the fraction of the rate limit that :func:`attjax.control.assurance.rate_mask`
@@ -97,10 +97,12 @@ class Policy:
             return Inputs(features, None)
         allowed, backward = jnp.ones(self.num_actions, bool), None
         if self.is_universal:
-            backward, context = backward_axes(observation, context), own_units.ordered(context)
+            backward, context = backward_axes(observation, context), torque_order.ordered(context)
+            allowed = torque_order.alive(context)
         if self.rate_margin > 0:
             angular_velocity = observation[observations.ANGULAR_VELOCITY]
-            allowed = assurance.rate_mask(context, self.rate_margin).allowed(angular_velocity)
+            mask = assurance.rate_mask(context, self.rate_margin)
+            allowed = allowed & mask.allowed(angular_velocity)
         return Inputs(features, allowed, backward)
 
     @property
@@ -110,7 +112,7 @@ class Policy:
 
     def command(self, action: chex.Array, context: Context) -> chex.Array:
         """The spacecraft's action, a row of its torque table or (3,) fractions, of the policy's."""
-        return own_units.rows(context)[action] if self.is_universal else action
+        return torque_order.rows(context)[action] if self.is_universal else action
 
     def outputs(self, params: dict, inputs: Inputs) -> chex.Array:
         """(outputs, samples) of (samples, ...) inputs: logits are MASKED_LOGIT where masked."""
@@ -118,7 +120,7 @@ class Policy:
         if inputs.allowed is None:
             return outputs
         if inputs.backward is not None:
-            outputs = own_units.turned_back(outputs, inputs.backward)
+            outputs = torque_order.turned_back(outputs, inputs.backward)
         return jnp.where(inputs.allowed.T, outputs, MASKED_LOGIT)
 
     def distribution(self, params: dict, inputs: Inputs) -> Categorical | Gaussian:
@@ -157,7 +159,7 @@ class Policy:
         if not self.is_universal:
             return logits
         lowest = jnp.full(len(context.torque_table), 2 * MASKED_LOGIT, logits.dtype)
-        return lowest.at[own_units.rows(context)].max(logits)
+        return lowest.at[torque_order.rows(context)].max(logits)
 
     def _decided(self, params, inputs, noise):
         """The action for one spacecraft's inputs: drawn, or the mode where there is no noise."""

@@ -12,7 +12,7 @@ import numpy as np
 from attjax.config import user_functions
 from attjax.config.run import Config
 from attjax.config.settings import Settings, Task
-from attjax.control import assurance, own_units
+from attjax.control import assurance, torque_order
 from attjax.control.features import FEATURES
 from attjax.control.looped import LoopedEnv
 from attjax.envs import fleet, initial_state, parameters
@@ -47,7 +47,7 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
         if settings.task.actions != "discrete":
             raise UserValueError("universal features are for discrete actions, not continuous ones")
         try:
-            own_units.check_axes(craft)
+            torque_order.check_axes(craft)
         except ValueError as error:
             raise UserValueError(str(error)) from None
     if name not in FEATURES:
@@ -58,7 +58,7 @@ def policy(settings: Settings, craft: Spacecraft = LM50) -> Policy:
     return Policy(
         features,
         network.hidden_sizes,
-        own_units.ACTIONS if settings.network.is_universal else craft.num_actions,
+        torque_order.ACTIONS if settings.network.is_universal else craft.num_actions,
         network.rate_margin,
         network.initial_weights,
         settings.task.actions,
@@ -98,6 +98,8 @@ def setup(
     """
     if settings.task.any_spacecraft:
         _check_fleet(settings, craft)
+    elif settings.task.crippled_share > 0:
+        raise UserValueError("crippled_share is for any_spacecraft")
     reward = REWARDS.get(settings.task.reward) or user_functions.resolve(settings.task.reward)
     start = initial_state.initial_state
     if settings.task.near_goal_share > 0:
@@ -209,8 +211,12 @@ def env_params(setup: train_state.Setup, seed: int = 0, update: int = 0) -> para
 def _fleet(setup, seed, number):
     """The fleet of that number of a run, by the names of its parameters."""
     frameskips = np.array(setup.settings.task.frameskips)[setup.group_of_row]
-    drawn = fleet.draw(np.random.default_rng([seed, number]), frameskips)
-    return {name: jnp.asarray(x, float) for name, x in drawn._asdict().items()}
+    random = np.random.default_rng([seed, number])
+    drawn = fleet.draw(random, frameskips)
+    drawn = fleet.with_faults(random, drawn, frameskips, setup.settings.task.crippled_share)
+    if not setup.env.world.is_ideal:  # which has disturbances of its own
+        drawn = drawn._replace(disturbance=None)
+    return drawn.parameters()
 
 
 def initial_parameters(policy: Policy, craft: Spacecraft = LM50) -> dict:

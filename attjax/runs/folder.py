@@ -30,7 +30,7 @@ try:
 except ImportError:  # Windows, where runs are not kept apart
     fcntl = None
 
-FORMAT = 11
+FORMAT = 12
 CONFIG, METRICS = belongings.CONFIG, belongings.METRICS
 LOST = "lost+found"
 
@@ -197,8 +197,9 @@ def read_config(folder: Path) -> Config:
 
 
 def _upgraded(content):
-    """Up to format 10 every run began anew and learned on what is measured; 9 had fewer settings, 7
-    still fewer, and 5 had them in one table; up to format 8 there was the ideal world only.
+    """Up to format 11 no axis was dead; up to 10 every run began anew and learned on what is
+    measured; 9 had fewer settings, 7 still fewer, and 5 had them in one table; up to 8 there was
+    the ideal world only.
     """
     version, given = content["format"], content["settings"]
     if version > 5:

@@ -9,7 +9,7 @@ import pytest
 from helpers.own_units import KINDS, PULSES, SKEW, context_of, renamed
 
 from attjax import LM50, AttitudeEnv, EnvState, Spacecraft, step
-from attjax.control import own_units, universal
+from attjax.control import torque_order, universal
 from attjax.control.own_units import OwnUnits
 
 ACTIONS = [(level, axis, sign) for level in range(3) for axis in range(3) for sign in (1, -1)]
@@ -61,11 +61,11 @@ def test_near_the_goal_every_spacecraft_is_the_same(x64, craft, frameskip):
 @pytest.mark.parametrize("signs", list(itertools.product((1, -1), repeat=3)))
 def test_an_action_turned_back_is_the_one_that_was_meant(signs):
     """The best of the network's outputs acts forward; about axes called backward it acts back."""
-    context = own_units.ordered(context_of(SKEW))
+    context = torque_order.ordered(context_of(SKEW))
     backward = np.array([signs]) < 0
-    for action in range(own_units.ACTIONS):
-        outputs = np.arange(own_units.ACTIONS) == action
-        place = np.argmax(own_units.turned_back(jnp.asarray(outputs[:, None]), backward)[:, 0])
+    for action in range(torque_order.ACTIONS):
+        outputs = np.arange(torque_order.ACTIONS) == action
+        place = np.argmax(torque_order.turned_back(jnp.asarray(outputs[:, None]), backward)[:, 0])
         units = OwnUnits.of(context)
         meant, done = (
             units.momentum @ np.linalg.solve(_tensor(context), context.torque_table[n])
@@ -80,20 +80,20 @@ def _tensor(context):
 
 def test_axes_are_in_order(x64):
     for craft in (LM50, PULSES, SKEW, *list(renamed(PULSES))[:8]):
-        context = own_units.ordered(context_of(craft))
+        context = torque_order.ordered(context_of(craft))
         units = OwnUnits.of(context)
         shape = np.asarray(units.shape)
         assert np.all(np.diff(np.diagonal(shape)) > 0)
         assert units.hand == np.sign(np.linalg.det(units.directions))
-        np.testing.assert_array_equal(own_units.rows(context), np.arange(own_units.ACTIONS))
+        np.testing.assert_array_equal(torque_order.rows(context), np.arange(torque_order.ACTIONS))
 
 
 def test_a_spacecraft_in_order_flies_by_the_same_torques(x64):
     for craft in (LM50, SKEW, Spacecraft(torque_levels=(0.01, 0.4, 0.1, 0.02))):
-        context, same = context_of(craft), context_of(own_units.in_order(craft))
-        chosen = context.torque_table[own_units.rows(context)]
+        context, same = context_of(craft), context_of(torque_order.in_order(craft))
+        chosen = context.torque_table[torque_order.rows(context)]
         np.testing.assert_allclose(same.torque_table, chosen, atol=1e-15)
-        np.testing.assert_array_equal(own_units.rows(same), np.arange(own_units.ACTIONS))
+        np.testing.assert_array_equal(torque_order.rows(same), np.arange(torque_order.ACTIONS))
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_three_levels_are_chosen(levels, chosen):
     table = Spacecraft(torque_levels=[1.0] * len(levels)).torque_table
     table = np.array(table) * np.append([0], np.repeat(levels, 6))[:, None]
     context = dataclasses.replace(context_of(LM50), torque_table=jnp.asarray(table, jnp.float32))
-    context = own_units.ordered(context)
+    context = torque_order.ordered(context)
     sizes = np.linalg.norm(context.torque_table, axis=1)
     np.testing.assert_allclose(sizes, [0, *np.repeat(chosen, 6)], rtol=1e-6)
 
@@ -123,9 +123,11 @@ def test_spacecraft_without_three_axes_are_refused(as_users_run):
     four = Spacecraft(torque_axes=((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)))
     flat = Spacecraft(torque_axes=((1, 0, 0), (0, 1, 0), (1, 1, 0)))
     with pytest.raises(ValueError, match="LM50 has 4 torque_axes; universal inputs are for 3"):
-        own_units.check_axes(four)
+        torque_order.check_axes(four)
     with pytest.raises(ValueError, match="LM50 has torque_axes in a plane"):
-        own_units.check_axes(flat)
+        torque_order.check_axes(flat)
     with pytest.raises(ValueError, match="the spacecraft has 9 actions; they must be of 3 axes"):
-        own_units.rows(context_of(Spacecraft(torque_levels=(0.1,), torque_axes=four.torque_axes)))
-    own_units.check_axes(SKEW)
+        torque_order.rows(
+            context_of(Spacecraft(torque_levels=(0.1,), torque_axes=four.torque_axes))
+        )
+    torque_order.check_axes(SKEW)

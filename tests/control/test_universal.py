@@ -9,7 +9,7 @@ import pytest
 from helpers.own_units import KINDS, PULSES, SKEW, TENSOR, context_of, renamed
 
 from attjax import LM50, AttitudeEnv, Spacecraft
-from attjax.control import own_units, universal
+from attjax.control import torque_order, universal
 from attjax.control.own_units import OwnUnits
 from attjax.envs import observation
 from attjax.export.flight_policy import FlightPolicy
@@ -20,7 +20,7 @@ from attjax.ppo.networks import Policy
 @KINDS
 def test_names_of_axes_change_nothing(craft):
     """Inputs and the torque decided on are the same to the last bit but for -0."""
-    policy = Policy("universal", (8,), own_units.ACTIONS, 0.99)
+    policy = Policy("universal", (8,), torque_order.ACTIONS, 0.99)
     state = observation.observe(jnp.array([0.3, -0.2, 0.4, 0.84]), jnp.array([0.02, -0.03, 0.01]))
     params = policy.init(jax.random.key(1), jax.random.key(2), state, context_of(craft))
     params["policy"]["params"]["Dense_1"]["kernel"] *= 100  # decisions that depend on the state
@@ -37,7 +37,7 @@ def test_names_of_axes_change_nothing(craft):
 def test_a_half_turn_of_a_body_in_its_principal_axes_turns_the_decision(x64, axis):
     """Gyroscopic torques among them: what is seen is the same, and what is decided is turned."""
     context = context_of(LM50)
-    policy = Policy("universal", (8,), own_units.ACTIONS, 0.99)
+    policy = Policy("universal", (8,), torque_order.ACTIONS, 0.99)
     turn = -np.ones(3)
     turn[axis] = 1
     vector, rate = jnp.array([0.3, -0.2, 0.4]), jnp.array([0.02, -0.03, 0.01])
@@ -54,23 +54,33 @@ def test_a_half_turn_of_a_body_in_its_principal_axes_turns_the_decision(x64, axi
 
 
 def test_axes_that_were_identified_to_be_weak_or_dead_are_seen(x64):
-    """An impulse still adds one about its axis, whatever its size; of none all stays finite."""
-    context = context_of(PULSES)
-    for gains in ((1, 0.5, 0.8), (1, 0.5, 0)):
+    """An impulse still adds one about its axis, whatever its size; a dead axis is the last."""
+    context, most = context_of(PULSES), float(context_of(PULSES).largest_torque)
+    policy = Policy("universal", (8,), torque_order.ACTIONS, 0.99)
+    for gains in ((1, 0.5, 0.8), (1, 0.03, 0.8), (0, 0.5, 1), (1, 0, 0.5), (1, 0.5, 0.01)):
         table = context.torque_table * np.array(gains)  # PULSES has torques along the body axes
-        weak = own_units.ordered(dataclasses.replace(context, torque_table=table))
+        weak = torque_order.ordered(dataclasses.replace(context, torque_table=table))
         state = observation.observe(jnp.array([0.3, -0.2, 0.4, 0.84]), jnp.full(3, 0.02))
-        assert np.all(np.isfinite(universal.universal_features(state, weak)))
-        if gains[2]:
-            impulse = weak.torque_table[1:7:2] * weak.torque_duration
-            gained = OwnUnits.of(weak).momentum @ np.linalg.solve(weak.inertia, impulse.T)
-            np.testing.assert_allclose(gained, np.eye(3), atol=1e-12)
+        seen, units = universal.universal_features(state, weak), OwnUnits.of(weak)
+        assert np.all(np.isfinite(seen))
+        impulse, is_dead = weak.torque_table[1:7:2] * weak.torque_duration, min(gains) < 0.02
+        flag = universal.CONSTANTS - universal.HAND - 1  # the place after that of the hand
+        assert seen[-flag] == units.is_crippled == is_dead
+        if is_dead:
+            impulse = impulse.at[2].set(0).at[2, np.argmin(gains)].set(most * weak.torque_duration)
+            impulse = impulse * units.hand
+        gained = units.momentum @ np.linalg.solve(weak.inertia, impulse.T)
+        np.testing.assert_allclose(np.abs(gained), np.eye(3), atol=1e-9)
+        allowed = policy.encode(state, weak).allowed
+        about_last = np.arange(1, torque_order.ACTIONS).reshape(3, 3, 2)[:, 2].ravel()
+        assert np.all(allowed[about_last] == (not is_dead))
+        assert np.all(np.delete(allowed, about_last))
 
 
 @pytest.mark.parametrize("way", [1, -1])
 @KINDS
 def test_universal_features_written_out(x64, craft, way):
-    context = own_units.ordered(context_of(craft, 11))
+    context = torque_order.ordered(context_of(craft, 11))
     units, h, d = OwnUnits.of(context), 0.05, float(context.torque_duration)
     q, w = np.array([0.3 * way, -0.25 * way, 4e-6, 0.9]), np.array([0.2, -1e-4, 3e-7])
     p, axes, shape = (np.asarray(x) for x in (units.momentum, units.directions, units.shape))
@@ -91,10 +101,14 @@ def test_universal_features_written_out(x64, craft, way):
     expected += [*(np.log(craft.rate_limit * moments) / 2 - 2.25)]
     levels = np.array(craft.torque_levels)
     expected += [*(np.log(levels[1:] / levels[0]) / 4 + 0.5), d / h, np.log(10 * h)]
-    expected += [np.prod(sign) * np.linalg.det(axes) / abs(np.linalg.det(axes))]
+    expected += [np.prod(sign) * np.linalg.det(axes) / abs(np.linalg.det(axes)), 0]
+    torque = np.array([1e-4, -3e-4, 2e-5])
+    push = np.linalg.solve(axes.T, torque) * h / (np.max(craft.torque_levels) * d)
+    expected += [np.tanh(k * component) for k in (4, 32, 256) for component in sign * push]
     observed = jnp.concatenate([q, np.full(4, 7.0), w])  # q̇ is not looked at
-    found = universal.universal_features(observed, context_of(craft, 11))
-    assert found.shape == (99,)
+    context = dataclasses.replace(context_of(craft, 11), disturbance=jnp.asarray(torque))
+    found = universal.universal_features(observed, context)
+    assert found.shape == (109,)
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
 
@@ -105,7 +119,7 @@ def test_features_of_a_large_batch_are_those_of_small_ones():
     observations = np.concatenate([quaternion, np.zeros((12_000, 4)), rate], axis=1)
     observations = jnp.asarray(observations, jnp.float32)
     context = context_of(LM50)
-    policy = Policy("universal", (8,), own_units.ACTIONS, 0.99)
+    policy = Policy("universal", (8,), torque_order.ACTIONS, 0.99)
     encode = jax.jit(jax.vmap(lambda x: policy.encode(x, context)))
     whole = encode(observations)
     parts = [encode(observations[n : n + 300]) for n in range(0, 12_000, 300)]
@@ -118,18 +132,20 @@ def test_features_of_a_large_batch_are_those_of_small_ones():
 
 def test_an_export_is_of_torques_in_order():
     env = AttitudeEnv(5)
-    policy = Policy("universal", (8,), own_units.ACTIONS, 0.99)
+    policy = Policy("universal", (8,), torque_order.ACTIONS, 0.99)
     state = observation.observe(jnp.array([0.0, 0.0, 0.0, 1.0]), jnp.zeros(3))
     keys = jax.random.split(jax.random.key(0))
     params = policy.init(*keys, state, env.context(env.default_params))
     with pytest.raises(ValueError, match="LM50 has torques in another order than the policy"):
         FlightPolicy(policy, params, env, Origin("no training"))
-    FlightPolicy(policy, params, AttitudeEnv(5, spacecraft=own_units.in_order(LM50)), Origin("no"))
+    FlightPolicy(
+        policy, params, AttitudeEnv(5, spacecraft=torque_order.in_order(LM50)), Origin("no")
+    )
 
 
 def test_scores_are_of_the_rows_of_the_table_and_the_best_is_what_is_done():
     """For an assurance, of any number of levels; what is none of its actions is the last choice."""
-    policy = Policy("universal", (8,), own_units.ACTIONS, 0.99)
+    policy = Policy("universal", (8,), torque_order.ACTIONS, 0.99)
     crafts = LM50, SKEW, Spacecraft(torque_levels=(0.3, 0.001, 0.2, 0.02, 0.002), inertia=TENSOR)
     rng = np.random.default_rng(0)
     for craft in (*crafts, Spacecraft(torque_levels=(0.4,))):
@@ -142,5 +158,5 @@ def test_scores_are_of_the_rows_of_the_table_and_the_best_is_what_is_done():
             scores = policy.scores(params, told, context)
             assert scores.shape == (len(context.torque_table),)
             assert int(jnp.argmax(scores)) == int(policy.act(params, told, context))
-        others = np.setdiff1d(np.arange(len(scores)), own_units.rows(context))
+        others = np.setdiff1d(np.arange(len(scores)), torque_order.rows(context))
         assert np.all(np.isfinite(scores)) and np.all(scores[others] < -1.5e9)

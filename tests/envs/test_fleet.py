@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from attjax import Spacecraft
+from attjax import AttitudeEnv, Spacecraft
 from attjax.envs import fleet
 from attjax.spacecraft import INTEGRATION_STEP
 
@@ -21,7 +21,7 @@ def drawn():
 
 def test_each_can_be_described():
     spacecraft = drawn()
-    for inertia, table, limit in list(zip(*spacecraft))[:300]:
+    for inertia, table, limit in list(zip(*spacecraft[:3]))[:300]:
         levels = np.linalg.norm(table[1::6], axis=1)
         described = Spacecraft(
             inertia=inertia.tolist(), torque_levels=levels.tolist(), rate_limit=float(limit)
@@ -81,6 +81,42 @@ def test_turns_are_rotations():
 def test_the_same_random_numbers_draw_the_same_spacecraft():
     again = fleet.draw(np.random.default_rng(3), FRAMESKIPS)
     other = fleet.draw(np.random.default_rng(4), FRAMESKIPS)
-    for x, y, z in zip(drawn(), again, other):
+    for x, y, z in zip(drawn()[:3], again[:3], other[:3]):
         np.testing.assert_array_equal(x, y)
         assert not np.allclose(x, z)
+
+
+def test_faults_are_as_said():
+    """Dead axes of bodies that have products of inertia and of some that have none; torques."""
+    sound = drawn()
+    faulty = fleet.with_faults(np.random.default_rng(5), sound, FRAMESKIPS, 0.3)
+    np.testing.assert_array_equal(faulty.rate_limit, sound.rate_limit)
+    dead = np.all(faulty.torque_table == 0, axis=1)
+    crippled = np.any(dead, axis=1)
+    assert np.all(np.sum(dead, axis=1)[crippled] == 1)
+    assert np.mean(crippled) == pytest.approx(0.3, abs=0.02)
+    assert np.all(np.mean(dead[crippled], axis=0) > 0.28)  # each axis
+    np.testing.assert_array_equal(faulty.torque_table[~crippled], sound.torque_table[~crippled])
+    np.testing.assert_array_equal(faulty.inertia[~crippled], sound.inertia[~crippled])
+    np.testing.assert_allclose(
+        np.linalg.eigvalsh(faulty.inertia[crippled]), np.linalg.eigvalsh(sound.inertia[crippled])
+    )
+    off = np.any(faulty.inertia[crippled][:, *np.triu_indices(3, 1)] != 0, axis=1)
+    assert np.mean(off) == pytest.approx((1 - fleet.PRINCIPAL) * fleet.TURNED, abs=0.05)
+    sizes = np.linalg.norm(faulty.disturbance, axis=1)
+    assert np.all(sizes[crippled] == 0)
+    pushed = sizes[~crippled] > 0
+    assert np.mean(pushed) == pytest.approx(fleet.PUSHED, abs=0.03)
+    period = (FRAMESKIPS + 1) * INTEGRATION_STEP
+    largest = np.max(sound.torque_table, axis=(1, 2)) * INTEGRATION_STEP
+    share = (sizes * period / largest)[~crippled][pushed]
+    low, high = fleet.PUSH
+    assert low <= share.min() < 2 * low and 0.5 * high < share.max() <= high
+
+
+def test_parameters_are_named_as_those_of_an_environment():
+    sound = drawn()
+    assert set(sound.parameters()) == {"inertia", "torque_table", "rate_limit"}
+    faulty = fleet.with_faults(np.random.default_rng(5), sound, FRAMESKIPS, 0.3).parameters()
+    assert set(faulty) == {"inertia", "torque_table", "rate_limit", "disturbance"}
+    assert AttitudeEnv(20).default_params.replace(**faulty).disturbance.shape == (COUNT, 3)

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from attjax import AttitudeEnv
-from attjax.control import own_units
+from attjax.control import torque_order
 from attjax.evaluation import paper
 from attjax.export import c as export_c
 from attjax.export import flight_check, provenance
@@ -41,7 +41,7 @@ def load(folder: Path, frameskip: int) -> FlightPolicy:
     policy, params = checkpoint.restore_network(folder)
     config, update = run_folder.read_config(folder), checkpoint.latest(folder)
     is_universal = policy.features == "universal"
-    craft = own_units.in_order(config.spacecraft) if is_universal else config.spacecraft
+    craft = torque_order.in_order(config.spacecraft) if is_universal else config.spacecraft
     env = AttitudeEnv(frameskip, spacecraft=craft)
     return FlightPolicy(policy, params, env, provenance.of_run(config, update, update))
 
@@ -49,7 +49,7 @@ def load(folder: Path, frameskip: int) -> FlightPolicy:
 @functools.cache
 def untrained(features, hidden_sizes, rate_margin, spacecraft=LM50) -> FlightPolicy:
     """Random weights, and biases too, that leave the decision to the state."""
-    spacecraft = own_units.in_order(spacecraft) if features == "universal" else spacecraft
+    spacecraft = torque_order.in_order(spacecraft) if features == "universal" else spacecraft
     policy = Policy(features, hidden_sizes, spacecraft.num_actions, rate_margin)
     shapes = jax.eval_shape(lambda: build.initial_parameters(policy)["policy"])
     leaves, tree = jax.tree.flatten(shapes)

@@ -18,6 +18,11 @@ SMALL = {
     "hidden_sizes": (4,), "updates_per_block": 5, "total_steps": 8 * 2 * 36,
 }  # fmt: skip
 
+NOISY = World(
+    sensors=Sensors(star_tracker=StarTracker(cross_boresight_arcsec=5, roll_arcsec=5)),
+    actuators=Actuators(gain=Uniform(0.9, 1.1)),
+)
+
 
 def trained(folder=None, stop_after=None, **values):
     def stops(row):
@@ -39,6 +44,22 @@ def test_a_fleet_flies_for_32_updates():
     assert not np.any(np.isclose(first.inertia[:, 0, 0], other.inertia[:, 0, 0]))
 
 
+def test_what_is_wrong_with_a_fleet():
+    """Dead axes by their share; a constant torque in the ideal world alone, which has none."""
+    many = SMALL | {"num_envs": 512, "minibatch_size": 512}
+    for preset, world, share in (("universal", World(), 0), ("two-torques", NOISY, 1)):
+        setup = build.of_config(run_config.new(preset, world=world, **many))
+        params = build.env_params(setup, 7, 0)
+        dead = np.all(params.torque_table == 0, axis=1)
+        assert np.all(np.sum(dead, axis=1) == share)
+        assert world.is_ideal == (params.disturbance is not None)
+        if world.is_ideal:
+            assert 0.05 < np.mean(np.any(params.disturbance != 0, axis=1)) < 0.2
+    half = run_config.new("universal", crippled_share=0.5, **many)
+    table = build.env_params(build.of_config(half), 7, 0).torque_table
+    assert 0.3 < np.mean(np.any(np.all(table == 0, axis=1), axis=1)) < 0.7
+
+
 def test_blocks_end_where_a_fleet_does():
     """With blocks of five updates the seventh has two; then all start an episode anew."""
     steps = []
@@ -52,10 +73,6 @@ def test_blocks_end_where_a_fleet_does():
     np.testing.assert_array_equal(run.env_params.inertia, expected.inertia)
 
 
-NOISY = World(
-    sensors=Sensors(star_tracker=StarTracker(cross_boresight_arcsec=5, roll_arcsec=5)),
-    actuators=Actuators(gain=Uniform(0.9, 1.1)),
-)
 LOOPED = {"world": NOISY, "in_flight_loop": True}
 
 
@@ -101,6 +118,10 @@ def test_all_start_anew_with_a_fleet():
     ("values", "said"),
     [
         ({"actions": "continuous"}, "any_spacecraft is for discrete actions, not continuous"),
+        (
+            {"any_spacecraft": False, "crippled_share": 0.1},
+            "crippled_share is for any_spacecraft",
+        ),
         (
             {"actions": "continuous", "any_spacecraft": False},
             "universal features are for discrete actions",

@@ -55,6 +55,9 @@ static void features_of(const float q[4], const float w[3], float features[FEATU
         rest[7 + $first_product + i] *= sign[pairs[i][0]] * sign[pairs[i][1]];
     }
     rest[7 + $hand] *= sign[0] * sign[1] * sign[2];
+    for (int i = 0; i < $pushes; i++) {
+        rest[7 + $first_push + i] *= sign[i % 3];
+    }
     for (int s = 0; s < SCALES; s++) {
         for (int i = 0; i < 6; i++) {
             features[6 * s + i] = tanhf(scales[s] * own[i]);
