@@ -57,7 +57,7 @@ def test_a_saved_policy_in_a_flight_loop_flies_on_both_devices():
 @pytest.mark.parametrize("frameskip", [5, 20])
 def test_the_universal_agent_flies_any_spacecraft(frameskip):
     policy = checkpoint.restore_policy(PRETRAINED / "universal")
-    judged = evaluation.evaluate_fleet(policy, AttitudeEnv(frameskip), episodes=300, seed=11)
+    judged = evaluation.evaluate_fleet(policy, AttitudeEnv(frameskip), episodes=1000, seed=11)
     assert judged["success_rate"] == 1 and judged["overspeed_rate"] == 0
-    assert judged["settling_over_estimate"] < 1.04
-    assert judged["terminal_over_quantisation"] < 1.5
+    assert judged["settling_over_estimate"] < 1.03
+    assert judged["terminal_over_quantisation"] < 1.4

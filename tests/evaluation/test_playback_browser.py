@@ -157,6 +157,7 @@ def test_nothing_is_cut_off(browser, width, height):
         });
         return [root.scrollWidth, root.scrollHeight, outside.map((x) => x.outerHTML)];
         """
+        wait_until(browser, lambda: browser.execute_script(script)[0] == width)  # once drawn anew
         wide, high, outside = browser.execute_script(script)
         assert wide == width and outside == []
         assert high == height or width < 500  # on a phone the panels lie one below the other

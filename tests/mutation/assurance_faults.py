@@ -57,8 +57,8 @@ ASSURANCE_FAULTS = {
         "chosen(shown, self.scores(shown, known))", ADAPTING,
     ),
     "a delay looked across by what was identified": (
-        "attjax/control/flight_loop.py", "queue = adaptation.given(memory.queue, context)",
-        "queue = _bodily(memory, known)", ADAPTING,
+        "attjax/control/flight_loop.py", "adaptation.given(queue, context), context)",
+        "memory.bodily(known), context)", ADAPTING,
     ),
     "a filter's mean where the truth is told": (
         "attjax/control/estimator.py",
@@ -74,7 +74,7 @@ ASSURANCE_FAULTS = {
         "known, shown = context", ADAPTING,
     ),
     "scores in the policy's own order": (
-        "attjax/ppo/networks.py", "lowest.at[own_units.rows(context)].max(logits)",
+        "attjax/ppo/networks.py", "lowest.at[torque_order.rows(context)].max(logits)",
         "lowest.at[: len(logits)].max(logits)", ["tests/control/test_own_units.py"],
     ),
 }  # fmt: skip

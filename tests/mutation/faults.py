@@ -1,5 +1,6 @@
 """Deliberate faults that no rule of mutants.py makes, each with the tests that should see it."""
 
+from agent_faults import AGENT_FAULTS
 from assurance_faults import ASSURANCE_FAULTS
 from loop_faults import LOOP_FAULTS
 from world_faults import WORLD_FAULTS
@@ -184,7 +185,7 @@ FAULTS = {
         ["tests/control/test_rate_limit.py"],
     ),
     "observation bound without coasting": (
-        "attjax/envs/attitude.py",
+        "attjax/envs/spaces.py",
         "(params.rate_limit + kick) * jnp.sqrt(jnp.max(moments) / jnp.min(moments))",
         "(params.rate_limit + kick)", ["tests/envs/test_observation_space.py"],
     ),
@@ -198,5 +199,5 @@ FAULTS = {
     "no lock on the folder": (
         "attjax/runs/folder.py", "fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)", "pass", RUNS,
     ),
-} | WORLD_FAULTS | LOOP_FAULTS | ASSURANCE_FAULTS  # fmt: skip
+} | WORLD_FAULTS | LOOP_FAULTS | ASSURANCE_FAULTS | AGENT_FAULTS  # fmt: skip
 """By name: module, code, what it becomes, tests that should catch it."""

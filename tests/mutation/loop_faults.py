@@ -2,6 +2,7 @@
 
 FILTER = ["tests/control/test_estimator.py"]
 LOOP = ["tests/control/test_flight_loop.py"]
+LATE = ["tests/control/test_lateness.py"]
 COVARIANCE = ["tests/control/test_covariance.py"]
 LOOP_FAULTS = {
     "a late star tracker taken for one of now": (
@@ -29,11 +30,22 @@ LOOP_FAULTS = {
         "walk = 0 * known.torque.walk(_length(rate)) * period", FILTER,
     ),
     "a predictor that looks one RK4 step too far": (
-        "attjax/control/belief.py", "frameskip=context.knowledge.delay - 1",
-        "frameskip=context.knowledge.delay", LOOP,
+        "attjax/control/belief.py", "frameskip=known.delay - 1", "frameskip=known.delay", LOOP,
     ),
     "torques under way that stay where they are": (
         "attjax/control/flight_loop.py", "queue.later(belief.rk4_steps(context))", "queue", LOOP,
+    ),
+    "a delay that is believed, whatever comes": (
+        "attjax/control/lateness.py", "return surprises + jax.vmap(surprise)(delays)",
+        "return surprises", LATE,
+    ),
+    "delays told apart by rates alone": (
+        "attjax/control/lateness.py", "for x, s, f in zip(numbers, spread, floor)",
+        "for x, s, f in zip(numbers[:3], spread, floor)", LATE,
+    ),
+    "a predictor that looks ahead by the most of the delays": (
+        "attjax/control/belief.py", "(agent_step, delay - 1, (None, None))",
+        "(agent_step, None, (None, None))", LATE,
     ),
     "a held torque for the whole period, whenever it begins": (
         "attjax/control/belief.py", "steps_on = following - start", "steps_on = steps", LOOP,
