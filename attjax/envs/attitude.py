@@ -207,20 +207,20 @@ class AttitudeEnv:
         observation = self.observe(key, next_state, params)
         return observation, next_state, self.reward(transition), terminated, info
 
-    def observe(self, key: chex.PRNGKey, state: EnvState, params: EnvParams) -> chex.Array:
+    def observe(self, key: chex.PRNGKey, state: EnvState, params: EnvParams | None) -> chex.Array:
         """What an agent is told of a state: the observation (11,) of Eq. 11, as measured.
 
         Where there is a disturbance, :func:`attjax.envs.leaning.leaned` against it.
 
         Args:
             key: unused: what is random of it is of the state.
-            state, params: of one spacecraft.
+            state, params: of one spacecraft; without parameters nothing disturbs.
         """
         del key
         rules = self.kinematic_factor, self.observes_quaternion_rate
         told = parameters.measured(state)
         observation = observations.observe(told.quaternion, told.angular_velocity, *rules)
-        if params.disturbance is None:
+        if params is None or params.disturbance is None:
             return observation
         return leaned(observation, self.context(params))
 

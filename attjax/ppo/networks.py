@@ -98,11 +98,11 @@ class Policy:
         allowed, backward = jnp.ones(self.num_actions, bool), None
         if self.is_universal:
             backward, context = backward_axes(observation, context), torque_order.ordered(context)
-            allowed = torque_order.alive(context)
         if self.rate_margin > 0:
             angular_velocity = observation[observations.ANGULAR_VELOCITY]
-            mask = assurance.rate_mask(context, self.rate_margin)
-            allowed = allowed & mask.allowed(angular_velocity)
+            allowed = assurance.rate_mask(context, self.rate_margin).allowed(angular_velocity)
+        if self.is_universal:
+            allowed &= torque_order.alive(context)
         return Inputs(features, allowed, backward)
 
     @property

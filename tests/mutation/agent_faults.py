@@ -36,7 +36,7 @@ AGENT_FAULTS = {
         "attjax/control/torque_order.py", "jnp.where(dead, jnp.inf, moments)", "moments", INPUTS,
     ),
     "torques about a dead axis to choose from": (
-        "attjax/ppo/networks.py", "allowed = torque_order.alive(context)", "pass", INPUTS,
+        "attjax/ppo/networks.py", "allowed &= torque_order.alive(context)", "pass", INPUTS,
     ),
     "the policy for a whole spacecraft, whatever is dead": (
         "attjax/ppo/crew.py", "jnp.where(torque_order.is_crippled(context), crippled, whole)",
