@@ -66,7 +66,7 @@ def _by_euler(scalar, first, second, third):
         jnp.sqrt(second**2 + third**2 + LEAST), jnp.sqrt(scalar**2 + first**2 + LEAST)
     )
     half_sum = abs(jnp.arctan2(first, scalar))
-    half_difference = abs(jnp.arctan2(third, second))
+    half_difference = abs(jnp.arctan2(third, second + LEAST**0.5))  # has a slope at rest, too
     half_difference = jnp.minimum(half_difference, jnp.pi - half_difference)  # or b the other way
     return between + 2 * jnp.maximum(half_sum, half_difference)
 
