@@ -1,14 +1,14 @@
 """When the torques of commands come, at the earliest and at the latest."""
 
 from attjax.envs.context import Context
-from attjax.envs.torque_bounds import high, low
+from attjax.envs.torque_bounds import delays, high, low
 from attjax.spacecraft import INTEGRATION_STEP
 from attjax.world import World
 
 
 def late(world: World, context: Context) -> int:
     """RK4 steps that a torque can come earlier or later than is believed."""
-    return max(abs(end - context.knowledge.delay) for end in _delays(world))
+    return max(abs(end - context.knowledge.delay) for end in delays(world.actuators))
 
 
 def uncounted(world: World, context: Context) -> float:
@@ -21,7 +21,7 @@ def uncounted(world: World, context: Context) -> float:
     steps = _steps(context)
     if context.agent_step.held:
         return late(world, context) / steps
-    first, last = (end // steps for end in _delays(world))
+    first, last = (end // steps for end in delays(world.actuators))
     believed = context.knowledge.delay // steps
     if world.actuators is not None and world.actuators.delay_jitter != 0:
         return last - first  # some too early, others too late
@@ -47,12 +47,3 @@ def check_order(world: World, context: Context) -> None:
 
 def _steps(context):
     return round(float(context.control_period) / INTEGRATION_STEP)
-
-
-def _delays(world):
-    """The least and the most of a torque's delay, RK4 steps."""
-    given = world.actuators
-    if given is None:
-        return 0, 0
-    numbers = given.delay, given.delay_jitter
-    return tuple(round(sum(end(x) for x in numbers)) for end in (low, high))

@@ -15,7 +15,7 @@ from attjax.dynamics.moving_parts import Motors, Wheels
 from attjax.dynamics.vectors import Vector
 from attjax.envs.doubt import Doubt, deviation_from_one, doubt
 from attjax.envs.sensors import ALLAN_TOP, ARCSEC, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, PPM, clock_of
-from attjax.envs.torque_bounds import high, low
+from attjax.envs.torque_bounds import delays
 from attjax.envs.torque_noise import TorqueNoise, torque_noise
 from attjax.spacecraft import INTEGRATION_STEP
 from attjax.world import World
@@ -188,7 +188,7 @@ def _delay(actuators):
 def _delays(actuators):
     if actuators is None or actuators.delay_jitter != 0:
         return None
-    ends = tuple(round(end(actuators.delay)) for end in (low, high))
+    ends = delays(actuators)
     return None if ends[0] == ends[1] else ends
 
 

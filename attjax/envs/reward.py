@@ -113,8 +113,11 @@ def logarithmic_reward(transition: Transition) -> Float[Array, ""]:
         >>> round(logarithmic_reward(at_rest).item(), 4)
         12.0
     """
-    angle = quaternions.error_angle(transition.next_quaternion)
-    reward = -jnp.log10(angle + 1e-6) * transition.control_period / REFERENCE_PERIOD
+    return _logarithmic(transition, quaternions.error_angle(transition.next_quaternion), 1e-6)
+
+
+def _logarithmic(transition, angle, offset):
+    reward = -jnp.log10(angle + offset) * transition.control_period / REFERENCE_PERIOD
     return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
 
 
@@ -135,9 +138,7 @@ def way_reward(transition: Transition) -> Float[Array, ""]:
     if table is None:
         raise ValueError("torque_table is None; the reward for the way needs it")
     offset = jnp.where(jnp.any(way.dead_axes(table)), 1e-4, 1e-6)
-    angle = way.angle_to_turn(quaternion, table)
-    reward = -jnp.log10(angle + offset) * transition.control_period / REFERENCE_PERIOD
-    return jnp.where(transition.terminated, OVERSPEED_PENALTY, reward)
+    return _logarithmic(transition, way.angle_to_turn(quaternion, table), offset)
 
 
 def binary_reward(transition: Transition) -> Float[Array, ""]:

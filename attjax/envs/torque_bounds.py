@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from attjax.dynamics.disturbances import EARTH_DIPOLE, EARTH_MU, EARTH_RADIUS, SOLAR_PRESSURE
-from attjax.world import Uncertainty, Wheels, World
+from attjax.world import Actuators, Uncertainty, Wheels, World
 from attjax.world.distributions import Number, largest, least
 
 DEVIATIONS = 5
@@ -34,6 +34,15 @@ def _end(number: Any, end: float, deviations: float) -> float:
 def most(number: Number) -> float:
     """The largest magnitude that it can have."""
     return max(abs(low(number)), abs(high(number)))
+
+
+def delays(actuators: Actuators | None) -> tuple[int, int]:
+    """The least and the most that a torque can come after its command, RK4 steps."""
+    if actuators is None:
+        return 0, 0
+    numbers = actuators.delay, actuators.delay_jitter
+    least, largest = (round(sum(end(x) for x in numbers)) for end in (low, high))
+    return least, largest
 
 
 def inertia_bounds(uncertainty: Uncertainty | None) -> tuple[tuple[float, float], float]:
