@@ -175,7 +175,8 @@ def one_argument(observation): return observation
         (
             "reward",
             "best",
-            "be one of paper, logarithmic, binary, authors, authors-continuous, or module:function",
+            "be one of paper, logarithmic, way, binary, authors, authors-continuous, or "
+            "module:function",
         ),
         ("features", "mine.scalar", "or module:function"),
     ],

@@ -22,7 +22,9 @@ FORMS = ("RigidState", "EquationsOfMotion", "PrincipalTerms", "TensorTerms")
 
 def reordered(form):
     """A named tuple with the same fields and methods in the opposite order."""
-    backwards = collections.namedtuple(form.__name__, form._fields[::-1])
+    fields = form._fields[::-1]
+    defaults = [form._field_defaults.get(x) for x in fields]  # after one's, all's
+    backwards = collections.namedtuple(form.__name__, fields, defaults=defaults)
     public = {x: y for x, y in vars(form).items() if x[0] != "_" and x not in form._fields}
     return type(form.__name__, (backwards,), public)
 

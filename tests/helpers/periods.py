@@ -51,7 +51,7 @@ def within(**given) -> Bounds:
     actions = len(given.get("offset", np.zeros(19)))
     ideal = Bounds(
         factors=(1.0, 1.0), turned=0.0, share=np.ones((2, actions)), tilt=0.0,
-        offset=np.zeros(actions), disturbance=0.0, late=0.0, rate=0.0, attitude=0.0,
+        offset=np.zeros(actions), disturbance=0.0, late=0.0, uncounted=0.0, rate=0.0, attitude=0.0,
         waits=(0.0, 0.0), duration=40.0,
     )  # fmt: skip
     return ideal._replace(**given)
