@@ -1,6 +1,7 @@
 """``eval.py --assured``: controllers under run-time assurance."""
 
 import argparse
+import math
 from typing import TYPE_CHECKING, Any
 
 from attjax import errors
@@ -9,6 +10,10 @@ from attjax.config import toml
 if TYPE_CHECKING:
     from attjax.control.assured import Assurance
     from attjax.envs.attitude import AttitudeEnv
+
+LITTLE = 0.1
+"""Share of the sphere, left to a body axis by its cone and the reserve, below which is a warning.
+"""
 
 
 def asked_for(arguments: argparse.Namespace, env: "AttitudeEnv") -> "Assurance | None":
@@ -33,7 +38,21 @@ def asked_for(arguments: argparse.Namespace, env: "AttitudeEnv") -> "Assurance |
             "nothing is proved of this world: what acts on the spacecraft in it can be stronger "
             "than the torques that are certain"
         )
+    _warn_of_wide_cones(assurance)
     return assurance
+
+
+def _warn_of_wide_cones(assurance):
+    """Where cones and their reserve leave next to nothing of the sphere, it does but brake."""
+    if assurance.cones is None:
+        return
+    reserve, widest = float(assurance.reserve), float(max(assurance.cones.half_angles))
+    left = (1 + math.cos(min(reserve + widest, math.pi))) / 2
+    if left < LITTLE:
+        errors.warning_line(
+            f"the spacecraft will hardly turn: by what the world states, once braked it may still "
+            f"drift by {math.degrees(reserve):.0f}° in a flight, and it keeps that far from a cone"
+        )
 
 
 def told(assurance: "Assurance | None") -> dict[str, Any]:

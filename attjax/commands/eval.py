@@ -98,8 +98,7 @@ def _add_conditions(group):
     )
     group.add_argument("--fleet", action="store_true", help=fleet_help)
     command_line.add_world(group, "that of the policy's training; ideal for a classical controller")
-    keep_out_help = "TOML file of cones [[keep_out]] that axes keep out of, for --assured"
-    group.add_argument("--keep-out", type=command_line.path, metavar="FILE", help=keep_out_help)
+    command_line.add_keep_out(group)
     duration_help = "length of an episode (default: the spacecraft's; LM50's is 43.75)"
     limits = {"above": 0, "high": MOST_DURATION}
     command_line.add_number(group, "duration", float, None, duration_help, unit="s", **limits)

@@ -92,15 +92,24 @@ def spacecraft(
     elif arguments.spacecraft is not None:
         craft = toml.read_spacecraft(arguments.spacecraft)
     else:
-        craft = made_for(world)
-        if config and not (config.settings.network.is_universal and craft != LM50):
-            craft = config.spacecraft
+        craft = in_world(config, world)
     if arguments.duration is not None:
         try:
             craft = dataclasses.replace(craft, duration=arguments.duration)
         except ValueError as error:
             raise errors.UserError(f"--duration {arguments.duration:g}: {error}") from None
     _check_duration(craft.duration, arguments.frameskip)
+    return craft
+
+
+def in_world(config: run_config.Config | None, world: World) -> Spacecraft:
+    """What a run's policy flies in a world: its own spacecraft.
+
+    A universal one flies what the world was described for, and so do those that have no run.
+    """
+    craft = made_for(world)
+    if config and not (config.settings.network.is_universal and craft != LM50):
+        return config.spacecraft
     return craft
 
 

@@ -2,10 +2,12 @@
 
 import argparse
 import contextlib
+import dataclasses
 import importlib
 from collections.abc import Sequence
 
 from attjax import destinations, devices, errors
+from attjax.commands import assured, evaluation_subject
 from attjax.config import command_line, fields, toml
 from attjax.export import c_names
 from attjax.runs import folder as run_folder
@@ -21,6 +23,7 @@ EXAMPLES = """\
 examples:
   python export.py --checkpoint pretrained/precise --format c --out flight/
   python export.py --checkpoint ckpt/ --best --format onnx --out flight/
+  python export.py --checkpoint ckpt/ --assured --world lm50-leo --format c --out flight/
 """
 
 
@@ -30,6 +33,7 @@ def parse_arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         usage=USAGE, description=__doc__, epilog=command_line.examples(EXAMPLES)
     )
     _add_what(parser.add_argument_group("what to export"))
+    _add_assurance(parser.add_argument_group("run-time assurance"))
     _add_output(parser.add_argument_group("output"))
     return parser.parse_args(argv)
 
@@ -41,6 +45,16 @@ def _add_what(group):
     group.add_argument("--spacecraft", type=command_line.path, metavar="FILE", help=craft_help)
     command_line.add_frameskip(group, "control rate of the flight software, 240/(N + 1) Hz")
     command_line.add_seed_and_device(group, "seed of the slews that test vectors come from")
+
+
+def _add_assurance(group):
+    assured_help = (
+        "the policy decides among actions alone after which every plant that the world states "
+        "keeps the rate limit, the wheels' speeds and the cones of --keep-out"
+    )
+    group.add_argument("--assured", action="store_true", help=assured_help)
+    command_line.add_world(group, "that of the policy's training")
+    command_line.add_keep_out(group)
 
 
 def _add_output(group):
@@ -73,6 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Export a checkpoint; returns the exit status."""
     arguments = parse_arguments(argv)
     with errors.one_line_errors():
+        _check_assurance(arguments)
         devices.select_device(arguments.device)
         module = _module(arguments.format)
         flight = _flight_policy(arguments)
@@ -87,6 +102,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         for name in contents:
             print(f"wrote {arguments.out / name}")
     return 0
+
+
+def _check_assurance(arguments):
+    for flag in ("world", "keep_out"):
+        if getattr(arguments, flag) and not arguments.assured:
+            raise errors.UserError(f"--{flag.replace('_', '-')} is for --assured")
+    if arguments.assured and arguments.format == "onnx":
+        raise errors.UserError("--assured is for --format c and stablehlo, not onnx")
 
 
 def _module(name):
@@ -120,13 +143,27 @@ def _flight_policy(arguments):
     frameskip = arguments.frameskip
     if frameskip is None:
         frameskip = fields.frameskip_to_judge(config.settings.task.frameskips)
+    world = toml.read_world(arguments.world) if arguments.world else config.world
+    craft, rules = _spacecraft(arguments, config, world), build.rules(config.settings.task)
     with _exporting(folder):
-        rules = build.rules(config.settings.task)
-        env = AttitudeEnv(frameskip, spacecraft=_spacecraft(arguments, config), **rules)
-        return FlightPolicy(policy, params, env, provenance.of_run(config, update, newest))
+        env = AttitudeEnv(frameskip, spacecraft=craft, **rules)
+        flight = FlightPolicy(policy, params, env, provenance.of_run(config, update, newest))
+    return dataclasses.replace(flight, guard=_guard(arguments, env, world))
 
 
-def _spacecraft(arguments, config):
+def _guard(arguments, env, world):
+    """What is let through of what a simulator's spacecraft does, in a world that it may fly in."""
+    from attjax.config import run as run_config
+    from attjax.export.assured import Guard
+
+    with errors.one_line_errors(ValueError):
+        run_config.check_world(world, env.spacecraft)
+        within = dataclasses.replace(env, world=world)
+    assurance = assured.asked_for(arguments, within)
+    return None if assurance is None else Guard(assurance, world)
+
+
+def _spacecraft(arguments, config, world):
     """What the policy is to fly; of a universal one with its torques in the policy's order."""
     from attjax.control import torque_order
 
@@ -136,7 +173,7 @@ def _spacecraft(arguments, config):
             f"--spacecraft is for universal policies; the one in {arguments.checkpoint} flies "
             f"{config.spacecraft} alone"
         )
-    craft = config.spacecraft if file is None else toml.read_spacecraft(file)
+    craft = toml.read_spacecraft(file) if file else evaluation_subject.in_world(config, world)
     return torque_order.in_order(craft) if is_universal else craft
 
 

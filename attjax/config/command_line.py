@@ -90,6 +90,12 @@ def add_world(group: Group, default: str) -> None:
     group.add_argument("--world", metavar="NAME|FILE", help=world_help)
 
 
+def add_keep_out(group: Group) -> None:
+    """Add --keep-out."""
+    keep_out_help = "TOML file of cones [[keep_out]] that axes keep out of, for --assured"
+    group.add_argument("--keep-out", type=path, metavar="FILE", help=keep_out_help)
+
+
 def add_frameskip(group: Group, meaning: str) -> None:
     """Add --frameskip, None where it is not given: one that suits the policy is chosen then."""
     table_2 = fields.TABLE_2

@@ -8,7 +8,7 @@ import numpy as np
 
 from attjax.control import assurance
 from attjax.envs import observation as observations
-from attjax.export import c_text
+from attjax.export import assured, c_text
 from attjax.export.kind import NOTHING_KEEPS, CDecision, Kind, States, decide_all
 from attjax.ppo import networks
 
@@ -55,19 +55,22 @@ def _decide(flight, quaternion, angular_velocity):
     inputs = flight.policy.encode(observation, flight.context)
     batch_of_one = jax.tree.map(lambda x: x[None], inputs)
     logits = flight.policy.outputs(flight.params, batch_of_one)[:, 0]
-    action = flight.policy.act(flight.params, observation, flight.context)
+    action = flight.act(observation, flight.context)
     return action.astype(jnp.int32), logits
 
 
 def _decisions(flight, quaternion, angular_velocity):
     action, logits = map(np.asarray, decide_all(flight, quaternion, angular_velocity))
-    nearby = [
-        np.asarray(decide_all(flight, quaternion, angular_velocity * np.float32(1 + change))[1])
-        for change in (-MASK_ROUNDING, MASK_ROUNDING)
-    ]
+    nearby = [angular_velocity * np.float32(1 + x) for x in (-MASK_ROUNDING, MASK_ROUNDING)]
     masked = logits == networks.MASKED_LOGIT
-    same_mask = [np.all((x == networks.MASKED_LOGIT) == masked, axis=1) for x in nearby]
-    clear = _not_tied(logits, masked) & same_mask[0] & same_mask[1]
+    near_logits = (np.asarray(decide_all(flight, quaternion, x)[1]) for x in nearby)
+    clear = np.ones(len(action), bool)
+    for near in near_logits:
+        clear &= np.all((near == networks.MASKED_LOGIT) == masked, axis=1)
+    if flight.guard is not None:
+        admitted, is_certain = flight.guard.admitted(quaternion, angular_velocity, MASK_ROUNDING)
+        masked, clear = masked | ~admitted, clear & is_certain
+    clear &= _not_tied(logits, masked)
     return Decisions(quaternion, angular_velocity, action, logits, clear)
 
 
@@ -115,14 +118,20 @@ def _c(flight):
             "actions": actions,
             "no_torque": int(np.flatnonzero(assurance.coasts(flight.torque_table))[0]),
             "torque_table": c_text.table(flight.torque_table),
+            "is_free": "",
             "outputs": "logits",
+            "admit": "",
+            "admit_declared": "",
+            "keep": "",
         },
         kept_rate=NOTHING_KEEPS,
         constants=flight.torque_table.size,
         stack=2 * actions,  # logits, allowed
         comparisons=actions - 1,
     )
-    return decision if mask is None else _c_masked(decision, mask, flight.policy.rate_margin)
+    if mask is not None:
+        decision = _c_masked(decision, mask, flight.policy.rate_margin)
+    return decision if flight.guard is None else assured.guarded(decision, flight.guard)
 
 
 def _c_masked(decision, mask, margin):

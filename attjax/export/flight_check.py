@@ -25,7 +25,7 @@ def flown_decisions(flight: FlightPolicy, seed: int, slews: int, states_per_slew
     params = flight.env.default_params
     key = jax.random.key(seed)
     _, start = evaluation.random_slews(flight.env, params, key, slews)
-    act = jax.tree_util.Partial(flight.policy.act, flight.params)
+    act = jax.tree_util.Partial(flight.act)
     steps = int(params.max_steps_in_episode)
     history = evaluation.record(act, flight.env, params, key, start, steps)
     chosen = np.linspace(0, steps - 1, states_per_slew).astype(int)

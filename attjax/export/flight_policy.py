@@ -13,6 +13,7 @@ from attjax.envs import observation as observations
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
 from attjax.export import provenance
+from attjax.export.assured import Guard
 from attjax.export.continuous import CONTINUOUS
 from attjax.export.discrete import DISCRETE
 from attjax.export.kind import Kind
@@ -39,6 +40,7 @@ class FlightPolicy:
         params: {"policy": ...}, their parameters.
         env: the simulator of the spacecraft, with its control rate.
         origin: where the parameters come from, and what they were trained for.
+        guard: an assurance that lets through some of the actions; None: there is none.
 
     Raises:
         ValueError: a parameter is not finite in float32, it is not one action alone that has no
@@ -51,6 +53,7 @@ class FlightPolicy:
     params: dict
     env: AttitudeEnv
     origin: Origin
+    guard: Guard | None = None
 
     def __post_init__(self):
         if self.env.kinematic_factor != 0.5:
@@ -86,12 +89,19 @@ class FlightPolicy:
         """The spacecraft as the policy knows it, in float32."""
         return self.env.context(self.env.default_params)
 
+    def act(self, observation: chex.Array, context: Context) -> chex.Array:
+        """The action for an observation (size,), of those that the assurance lets through."""
+        if self.guard is None:
+            return self.policy.act(self.params, observation, context)
+        scores = self.policy.scores(self.params, observation, context)
+        return self.guard.assurance.chosen(observation, scores)
+
     def act_in_float32(self, observation: chex.Array, context: Context) -> chex.Array:
         """The action for an observation (11,) of any type; the context is its own, float32."""
         del context
         single = observation.astype(jnp.float32)
         state = single[observations.QUATERNION], single[observations.ANGULAR_VELOCITY]
-        return self.policy.act(self.params, observations.observe(*state), self.context)
+        return self.act(observations.observe(*state), self.context)
 
     @property
     def control_period(self) -> np.float32:
@@ -114,7 +124,9 @@ class FlightPolicy:
     def facts(self) -> dict[str, str]:
         """What an exported file says of itself: :func:`attjax.export.provenance.facts`."""
         parameters = parameter_hash(self.params)
-        return provenance.facts(self.origin, self.env.frameskip, self.env.spacecraft, parameters)
+        craft = self.env.spacecraft
+        told = provenance.facts(self.origin, self.env.frameskip, craft, parameters)
+        return told if self.guard is None else told | {"assured": self.guard.told}
 
 
 def _layers(params):

@@ -49,6 +49,17 @@ def test_a_world_in_which_nothing_is_proved_is_flown_with_a_warning(capsys, tmp_
     assert "assured: limits, as well as it can" in output.err
 
 
+def test_cones_that_leave_nothing_to_turn_to_are_warned_of(capsys):
+    """In lm50-leo it may drift by 147 degrees: what is let through there is to stand still."""
+    flags = [*FLAGS, "--assured", f"--keep-out={SUN}", "--duration=43.75", "--json=-"]
+    assert eval_script.main([*flags, "--world=lm50-leo"]) == 0
+    output = capsys.readouterr()
+    assert json.loads(output.out)["success_rate"] == 0
+    assert "warning: the spacecraft will hardly turn" in output.err and "by 147° in" in output.err
+    assert eval_script.main([*flags, "--duration=5"]) == 0
+    assert "warning" not in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     "flags, said",
     [

@@ -9,7 +9,7 @@ int attjax_decide(const float quaternion[4], const float angular_velocity[3])
     }
     attjax_logits(quaternion, angular_velocity, logits);
     allow(angular_velocity, allowed);
-    for (int a = 0; a < ATTJAX_ACTIONS; a++) {
+$keep    for (int a = 0; a < ATTJAX_ACTIONS; a++) {
         if (allowed[a] && (best < 0 || logits[a] > logits[best])) {
             best = a; /* the first of equal ones */
         }

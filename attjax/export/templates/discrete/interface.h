@@ -22,3 +22,4 @@ int attjax_decide(const float quaternion[4], const float angular_velocity[3]);
  */
 void attjax_logits(const float quaternion[4], const float angular_velocity[3],
                    float logits[ATTJAX_ACTIONS]);
+$admit_declared

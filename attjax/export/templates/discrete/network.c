@@ -4,4 +4,4 @@ void attjax_logits(const float quaternion[4], const float angular_velocity[3],
 $forward
 }
 
-$allow
+$allow$admit
