@@ -138,7 +138,7 @@ def _check_make(arguments):
     """The target exists, and what it runs has the flags that ARGS passes on."""
     if shutil.which("make") is None:
         return
-    clean = {k: v for k, v in os.environ.items() if not k.startswith(("MAKE", "MFLAGS"))}
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(("MAKE", "MFLAGS", "ARGS"))}
     options = {"capture_output": True, "text": True, "timeout": 60, "env": clean, "cwd": ROOT}
     result = subprocess.run(["make", "--dry-run", *arguments], **options)
     assert result.returncode == 0, result.stderr
