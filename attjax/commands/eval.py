@@ -162,7 +162,7 @@ def _evaluate(how, controllers, plots, metrics, json_file):
     from attjax import evaluation
     from attjax.evaluation import tables
 
-    arguments, env, _, assurance = how
+    arguments, env, config, assurance = how
     params, seed, episodes = env.default_params, arguments.seed or 0, arguments.episodes
     judge = evaluation.evaluate_fleet if arguments.fleet else evaluation.evaluate
     start, results, written = time.monotonic(), [], []
@@ -194,6 +194,8 @@ def _evaluate(how, controllers, plots, metrics, json_file):
             tables.print_report(results[0], env.spacecraft)
         if assurance is not None:
             print(assured.line(assurance))
+        if beside := evaluation_subject.companion(arguments, config):
+            print(f"where an axis is found to be dead: the policy in {beside}")
         print(f"evaluated in {seconds:.1f} s, compilation included")
     return 0
 

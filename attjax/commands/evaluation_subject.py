@@ -13,6 +13,8 @@ from attjax.spacecraft import INTEGRATION_STEP, LM50, Spacecraft
 from attjax.world import IDEAL, World, made_for
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from attjax.control.assured import Assurance
     from attjax.envs.attitude import AttitudeEnv
     from attjax.evaluation.flown import Controller
@@ -173,6 +175,15 @@ def flown(
     if arguments.bare:
         return controller if assurance is None else assured(controller, assurance, scores)
     return flight_loop(controller, adapts=arguments.adaptive, assurance=assurance, scores=scores)
+
+
+def companion(arguments: argparse.Namespace, config: run_config.Config | None) -> "Path | None":
+    """Where the policy is that takes over from the one judged if an axis is found to be dead."""
+    from attjax.runs import flight
+
+    if config is None or not (arguments.adaptive and config.settings.network.is_universal):
+        return None
+    return flight.companion(arguments.checkpoint)
 
 
 def _controller(name, arguments, env, config):

@@ -49,7 +49,7 @@ class Guard(NamedTuple):
         cones = self.assurance.cones
         count = 0 if cones is None else len(cones.axes)
         limits = f"limits and {count} cone{'s' * (count > 1)}" if count else "limits"
-        world = self.world.name
+        world = " ".join(self.world.name.split())
         if self.assurance.is_certain:
             return f"{limits}, for every plant that world {world} states"
         return f"NOTHING IS PROVED of world {world}; {limits}, as well as can be"
@@ -66,7 +66,7 @@ def guarded(decision: CDecision, guard: Guard) -> CDecision:
         "within": "",
         "keep": "    keep_admitted(quaternion, angular_velocity, allowed);\n",
     }
-    guarded = decision._replace(
+    result = decision._replace(
         kept_rate="kept by the assurance that is told of above",
         parts=parts | dict(decision.parts),
         values=dict(decision.values) | values | _texts(tables) | _numbers(assurance),
@@ -76,7 +76,7 @@ def guarded(decision: CDecision, guard: Guard) -> CDecision:
         comparisons=decision.comparisons + 1 + 7 * actions,
         other=decision.other + 11 + 21 * actions,
     )
-    return guarded if assurance.cones is None else _with_cones(guarded, assurance, actions)
+    return result if assurance.cones is None else _with_cones(result, assurance, actions)
 
 
 def _with_cones(decision, assurance, actions):
@@ -84,8 +84,8 @@ def _with_cones(decision, assurance, actions):
     count, phases = len(tables["cone_axes"]), len(tables["edges"]) - 1
     values = {
         "kept": "    const float kept = kept_squared(quaternion, peak);\n",
-        # A slew that a cone holds back fails in neither.
-        "is_free": " && slew_error_deg[s] <= GOAL_DEG",
+        # That a cone holds a slew back, in JAX too, is no failure.
+        "unless_held": " && slew_error_deg[s] <= GOAL_DEG",
         "within": "\n                      && squared + change[a] <= kept",
         "cone_count": count,
         "edge_count": phases + 1,

@@ -109,7 +109,7 @@ def _c(flight):
             "title": "the torque to apply next",
             "largest": ", ".join(map(str, largest)),
             "largest_torque": c_text.row(largest),
-            "is_free": "",
+            "unless_held": "",
             "outputs": "outputs",
         },
         kept_rate=NOTHING_KEEPS,

@@ -118,7 +118,7 @@ def _c(flight):
             "actions": actions,
             "no_torque": int(np.flatnonzero(assurance.coasts(flight.torque_table))[0]),
             "torque_table": c_text.table(flight.torque_table),
-            "is_free": "",
+            "unless_held": "",
             "outputs": "logits",
             "admit": "",
             "admit_declared": "",

@@ -44,6 +44,12 @@ def load_flight_loop(
     return flight_loop(act, adapts=adapts, assurance=assurance, scores=scores)
 
 
+def companion(folder: Path) -> Path | None:
+    """The folder of the policy that takes over where an axis is dead; None: there is none."""
+    beside = folder / TWO_TORQUES
+    return beside if beside.is_dir() else None
+
+
 def network(
     folder: Path, *, use_best: bool = False, adapts: bool = False
 ) -> tuple[Policy | Crew, dict]:
@@ -56,8 +62,8 @@ def network(
         FolderError: as of :func:`load_flight_loop`, or the other policy is not a universal one.
     """
     policy, params = restore_network(folder, best(folder) if use_best else None)
-    beside = folder / TWO_TORQUES
-    if not (adapts and policy.is_universal and beside.is_dir()):
+    beside = companion(folder)
+    if beside is None or not (adapts and policy.is_universal):
         return policy, params
     other, others = restore_network(beside, best(beside) if use_best else None)
     if not other.is_universal:

@@ -39,6 +39,14 @@ def test_a_universal_policy_is_assured_as_any(capsys, flags):
     assert json.loads(capsys.readouterr().out)["assured"] is True
 
 
+def test_it_says_which_policy_takes_over(capsys):
+    flags = ["--checkpoint=pretrained/universal", *FLAGS[1:], "--duration=2", "--episodes=2"]
+    said = "where an axis is found to be dead: the policy in pretrained/universal/two-torques"
+    for more, is_said in (["--adaptive"], True), ([], False):
+        assert eval_script.main([*flags, *more]) == 0
+        assert (said in capsys.readouterr().out) is is_said
+
+
 def test_a_world_in_which_nothing_is_proved_is_flown_with_a_warning(capsys, tmp_path):
     weak = tmp_path / "weak.toml"
     weak.write_text("[disturbances]\nconstant_torque = 0.2\n")

@@ -25,10 +25,11 @@ def test_names_of_axes_change_nothing(craft):
     params = policy.init(jax.random.key(1), jax.random.key(2), state, context_of(craft))
     params["policy"]["params"]["Dense_1"]["kernel"] *= 100  # decisions that depend on the state
     seen, torques = [], []
+    features, act = jax.jit(universal.universal_features), jax.jit(policy.act)
     for same in renamed(craft):
         context = context_of(same)
-        seen.append(universal.universal_features(state, context))
-        torques.append(context.torque_table[policy.act(params, state, context)])
+        seen.append(features(state, context))
+        torques.append(context.torque_table[act(params, state, context)])
     assert len(np.unique(np.array(seen) + 0.0, axis=0)) == 1
     assert len(np.unique(np.array(torques) + 0.0, axis=0)) == 1 and np.any(torques[0])
 
@@ -153,10 +154,11 @@ def test_scores_are_of_the_rows_of_the_table_and_the_best_is_what_is_done():
         keys = jax.random.split(jax.random.key(0))
         params = policy.init(*keys, jnp.zeros(11).at[3].set(1), context)
         params = jax.tree.map(lambda x: x + jnp.asarray(rng.normal(size=x.shape), x.dtype), params)
+        score, act = jax.jit(policy.scores), jax.jit(policy.act)
         for rate in rng.normal(0, 0.1, (20, 3)):
             told = observation.observe(jnp.asarray(rng.normal(size=4) / 2), jnp.asarray(rate))
-            scores = policy.scores(params, told, context)
+            scores = score(params, told, context)
             assert scores.shape == (len(context.torque_table),)
-            assert int(jnp.argmax(scores)) == int(policy.act(params, told, context))
+            assert int(jnp.argmax(scores)) == int(act(params, told, context))
         others = np.setdiff1d(np.arange(len(scores)), torque_order.rows(context))
         assert np.all(np.isfinite(scores)) and np.all(scores[others] < -1.5e9)

@@ -1,6 +1,7 @@
 """Flight loops of saved policies: one alone, or with another for when an axis is dead."""
 
 import dataclasses
+import functools
 import shutil
 from pathlib import Path
 
@@ -29,12 +30,26 @@ def contexts():
         yield True, dataclasses.replace(whole, torque_table=table)
 
 
+@functools.partial(jax.jit, static_argnums=0)
+def asked(crew, params, told, context):
+    """Action, one drawn, and scores: the crew's, those of its policy for all axes and for two."""
+    key = jax.random.key(0)
+    members = (crew, params), *((getattr(crew, x), params[x]) for x in ("whole", "crippled"))
+    return [
+        (
+            x.act(of_it, told, context),
+            x.draw(of_it, key, told, context),
+            x.scores(of_it, told, context),
+        )
+        for x, of_it in members
+    ]
+
+
 def test_the_policy_is_chosen_that_is_for_what_is_left():
     """Whichever way it is asked: for an action, for one drawn, for scores."""
     crew, params = flight.network(UNIVERSAL, adapts=True)
     assert isinstance(crew, Crew) and crew.is_universal
-    whole, crippled = ((getattr(crew, x), params[x]) for x in ("whole", "crippled"))
-    rng, key, differing = np.random.default_rng(0), jax.random.key(0), 0
+    rng, differing = np.random.default_rng(0), 0
     for is_crippled, context in contexts():
         for _ in range(4):
             q = rng.normal(size=4)
@@ -42,16 +57,11 @@ def test_the_policy_is_chosen_that_is_for_what_is_left():
                 jnp.asarray(q / np.linalg.norm(q), jnp.float32),
                 jnp.asarray(rng.normal(0, 0.05, 3), jnp.float32),
             )
-            (policy, of_it), (other, of_other) = (
-                (crippled, whole) if is_crippled else (whole, crippled)
-            )
-            action = policy.act(of_it, told, context)
-            assert crew.act(params, told, context) == action
-            differing += int(other.act(of_other, told, context) != action)
-            drawn = policy.draw(of_it, key, told, context)
-            assert crew.draw(params, key, told, context) == drawn
-            scores = crew.scores(params, told, context)
-            np.testing.assert_array_equal(scores, policy.scores(of_it, told, context))
+            found, whole, crippled = asked(crew, params, told, context)
+            chosen, other = (crippled, whole) if is_crippled else (whole, crippled)
+            for ours, theirs in zip(found, chosen):
+                np.testing.assert_array_equal(ours, theirs)
+            differing += int(other[0] != found[0])
     assert differing > 10
 
 

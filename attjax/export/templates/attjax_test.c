@@ -118,7 +118,7 @@ static int fly(void)
         printf("slew %d: error at the end %.6f deg, in attjax %.6f; ", s + 1, error,
                slew_error_deg[s]);
         printf("rate %.6f rad/s, in attjax %.6f\n", norm(x + 4, 3), slew_rate[s]);
-        if (!(error <= GOAL_DEG)$is_free) { /* of NaN, too */
+        if (!(error <= GOAL_DEG)$unless_held) { /* of NaN, too */
             printf("slew %d: FAILED: the goal is an error of %g deg at most\n", s + 1, GOAL_DEG);
             failures++;
         } else if (!(largest_rate <= (double)ATTJAX_RATE_LIMIT)) {
