@@ -6,6 +6,7 @@ CLOSED = ["tests/control/test_assured.py"]
 CONES = ["tests/control/test_keep_out.py"]
 STATED = ["tests/envs/test_bounds.py"]
 ADAPTING = ["tests/control/test_assured_adaptation.py"]
+IN_C = ["tests/export/test_export_assured.py"]
 ASSURANCE_FAULTS = {
     "the least of what lowers P taken for the most": (
         "attjax/control/plants.py", "straight += jnp.maximum(", "straight += jnp.minimum(", BOUNDS,
@@ -72,6 +73,24 @@ ASSURANCE_FAULTS = {
     "what was believed before the flight for the controller": (
         "attjax/control/flight_loop.py", "known, shown = self.believed(memory, context)",
         "known, shown = context", ADAPTING,
+    ),
+    "what an error of the rate adds left out in C": (
+        "attjax/export/assured.py", '"of_rate_error": 2 * assurance.error',
+        '"of_rate_error": 0 * assurance.error', IN_C,
+    ),
+    "the square of an action's own change left out in C": (
+        "attjax/export/templates/discrete/admit.c", "2.0f * work + growth[a] * growth[a]",
+        "2.0f * work", IN_C,
+    ),
+    "an action that brakes and is not let through in C": (
+        "attjax/export/templates/discrete/admit.c", "    admitted[braking] = 1;\n", "", IN_C,
+    ),
+    "cones seen from the other side in C": (
+        "attjax/export/templates/discrete/cones.c", "- q[3] * d[i]", "+ q[3] * d[i]", IN_C,
+    ),
+    "actions that are not let through, chosen in C": (
+        "attjax/export/assured.py", "    keep_admitted(quaternion, angular_velocity, allowed);\\n",
+        "    (void)keep_admitted;\\n", IN_C,
     ),
     "scores in the policy's own order": (
         "attjax/ppo/networks.py", "lowest.at[torque_order.rows(context)].max(logits)",
