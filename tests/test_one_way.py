@@ -78,8 +78,7 @@ def test_records_figures_pages_and_vectors_fly_what_the_environment_does(monkeyp
 
     exported = types.SimpleNamespace(
         env=env,
-        policy=types.SimpleNamespace(act=lambda _, *args: BRAKE(*args)),
-        params=None,
+        act=BRAKE,
         act_in_float32=BRAKE,
         context=env.context(params),
         torque_table=params.torque_table,

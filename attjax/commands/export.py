@@ -23,7 +23,7 @@ EXAMPLES = """\
 examples:
   python export.py --checkpoint pretrained/precise --format c --out flight/
   python export.py --checkpoint ckpt/ --best --format onnx --out flight/
-  python export.py --checkpoint ckpt/ --assured --world lm50-leo --format c --out flight/
+  python export.py --checkpoint ckpt/ --assured --format c --out flight/
 """
 
 
