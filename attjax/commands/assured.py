@@ -16,6 +16,17 @@ LITTLE = 0.1
 """
 
 
+def check(arguments: argparse.Namespace, *flags: str) -> None:
+    """Check that none of these flags, which are for --assured, is given without it.
+
+    Raises:
+        UserError: one is.
+    """
+    for flag in flags:
+        if getattr(arguments, flag) is not None and not arguments.assured:
+            raise errors.UserError(f"--{flag.replace('_', '-')} is for --assured")
+
+
 def asked_for(arguments: argparse.Namespace, env: "AttitudeEnv") -> "Assurance | None":
     """The assurance that was asked for; None where there is none.
 
@@ -26,8 +37,11 @@ def asked_for(arguments: argparse.Namespace, env: "AttitudeEnv") -> "Assurance |
     Raises:
         UserError: its cones cannot be read.
     """
-    if not arguments.assured:
-        return None
+    return described(arguments, env) if arguments.assured else None
+
+
+def described(arguments: argparse.Namespace, env: "AttitudeEnv") -> "Assurance":
+    """As :func:`asked_for`, whether or not it was."""
     from attjax.control import assured
 
     keep_out = toml.read_keep_out(arguments.keep_out) if arguments.keep_out else ()
@@ -65,7 +79,8 @@ def told(assurance: "Assurance | None") -> dict[str, Any]:
 
 def line(assurance: "Assurance") -> str:
     """What the report says of it."""
-    cones = told(assurance)["keep_out"]
-    limits = f"limits and {cones} cone{'s' * (cones > 1)}" if cones else "limits"
+    from attjax.control import keep_out
+
+    limits = keep_out.limits(assurance.cones)
     how = "for every plant that the world states" if assurance.is_certain else "as well as it can"
     return f"assured: {limits}, {how}"

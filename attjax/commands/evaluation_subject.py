@@ -6,6 +6,7 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from attjax import errors
+from attjax.commands import assured
 from attjax.config import run as run_config
 from attjax.config import toml
 from attjax.runs import folder as run_folder
@@ -57,8 +58,7 @@ def complete(arguments: argparse.Namespace) -> None:
     Raises:
         UserError: flags do not go together.
     """
-    if arguments.keep_out and not arguments.assured:
-        raise errors.UserError("--keep-out is for --assured")
+    assured.check(arguments, "keep_out")
     if arguments.episodes is None:
         arguments.episodes = 1000 if arguments.robustness else 5000
     for ladder, flags in NOT_WITH.items():
@@ -166,14 +166,14 @@ def flown(
     Raises:
         UserError: the checkpoint cannot be read, or its policy cannot fly the spacecraft.
     """
-    from attjax.control.assured import assured
+    from attjax.control.assured import assured as under_assurance
     from attjax.control.flight_loop import flight_loop
 
     controller, scores = _controller(name, arguments, env, config)
     if arguments.robustness:  # which flies each in every way
         return controller
     if arguments.bare:
-        return controller if assurance is None else assured(controller, assurance, scores)
+        return controller if assurance is None else under_assurance(controller, assurance, scores)
     return flight_loop(controller, adapts=arguments.adaptive, assurance=assurance, scores=scores)
 
 

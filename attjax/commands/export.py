@@ -87,7 +87,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Export a checkpoint; returns the exit status."""
     arguments = parse_arguments(argv)
     with errors.one_line_errors():
-        _check_assurance(arguments)
+        assured.check(arguments, "world", "keep_out")
+        if arguments.assured and arguments.format == "onnx":
+            raise errors.UserError("--assured is for --format c and stablehlo, not onnx")
         devices.select_device(arguments.device)
         module = _module(arguments.format)
         flight = _flight_policy(arguments)
@@ -102,14 +104,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         for name in contents:
             print(f"wrote {arguments.out / name}")
     return 0
-
-
-def _check_assurance(arguments):
-    for flag in ("world", "keep_out"):
-        if getattr(arguments, flag) and not arguments.assured:
-            raise errors.UserError(f"--{flag.replace('_', '-')} is for --assured")
-    if arguments.assured and arguments.format == "onnx":
-        raise errors.UserError("--assured is for --format c and stablehlo, not onnx")
 
 
 def _module(name):
@@ -143,11 +137,13 @@ def _flight_policy(arguments):
     frameskip = arguments.frameskip
     if frameskip is None:
         frameskip = fields.frameskip_to_judge(config.settings.task.frameskips)
-    world = toml.read_world(arguments.world) if arguments.world else config.world
+    world = evaluation_subject.world(arguments, config)
     craft, rules = _spacecraft(arguments, config, world), build.rules(config.settings.task)
     with _exporting(folder):
         env = AttitudeEnv(frameskip, spacecraft=craft, **rules)
         flight = FlightPolicy(policy, params, env, provenance.of_run(config, update, newest))
+    if not arguments.assured:
+        return flight
     return dataclasses.replace(flight, guard=_guard(arguments, env, world))
 
 
@@ -159,8 +155,7 @@ def _guard(arguments, env, world):
     with errors.one_line_errors(ValueError):
         run_config.check_world(world, env.spacecraft)
         within = dataclasses.replace(env, world=world)
-    assurance = assured.asked_for(arguments, within)
-    return None if assurance is None else Guard(assurance, world)
+    return Guard(assured.described(arguments, within), world)
 
 
 def _spacecraft(arguments, config, world):

@@ -68,3 +68,9 @@ def cones_of(keep_out: Sequence[KeepOut], context: Context) -> Cones | None:
     half_angles = np.deg2rad([cone.half_angle_deg for cone in keep_out])
     numbers = axes, directions, half_angles, 2 * context.kinematic_factor
     return Cones(*(jnp.asarray(x, dtype) for x in numbers))
+
+
+def limits(cones: Cones | None) -> str:
+    """What an assurance keeps, for people."""
+    count = 0 if cones is None else len(cones.axes)
+    return f"limits and {count} cone{'s' * (count > 1)}" if count else "limits"

@@ -41,8 +41,8 @@ def delays(actuators: Actuators | None) -> tuple[int, int]:
     if actuators is None:
         return 0, 0
     numbers = actuators.delay, actuators.delay_jitter
-    least, largest = (round(sum(end(x) for x in numbers)) for end in (low, high))
-    return least, largest
+    first, last = (round(sum(end(x) for x in numbers)) for end in (low, high))
+    return first, last
 
 
 def inertia_bounds(uncertainty: Uncertainty | None) -> tuple[tuple[float, float], float]:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
+from attjax.control import keep_out
 from attjax.control.assured import Assurance
 from attjax.export import c_text
 from attjax.export.kind import CDecision
@@ -46,9 +47,7 @@ class Guard(NamedTuple):
     @property
     def told(self) -> str:
         """What it keeps, for people."""
-        cones = self.assurance.cones
-        count = 0 if cones is None else len(cones.axes)
-        limits = f"limits and {count} cone{'s' * (count > 1)}" if count else "limits"
+        limits = keep_out.limits(self.assurance.cones)
         world = " ".join(self.world.name.split())
         if self.assurance.is_certain:
             return f"{limits}, for every plant that world {world} states"
