@@ -129,10 +129,13 @@ def ordered(context: Context) -> Context:
 
 
 def _three_of(levels):
-    """(3,) numbers of the largest level, of one between, and of the smallest that is not dead."""
+    """(3,) numbers of the largest level, of one between, and of the smallest that is not dead.
+
+    Of equal ones the first is the largest and the last the smallest: what is in order stays in it.
+    """
     first = jnp.argmax(levels)
     is_dead = levels < DEAD_LEVEL * levels[first]
-    last = jnp.argmin(jnp.where(is_dead, jnp.inf, levels))
+    last = len(levels) - 1 - jnp.argmin(jnp.where(is_dead, jnp.inf, levels)[::-1])
     if len(levels) <= 2:
         return jnp.stack([first, last, last])
     logarithms = jnp.log(levels)

@@ -89,7 +89,8 @@ def test_axes_are_in_order(x64):
 
 
 def test_a_spacecraft_in_order_flies_by_the_same_torques(x64):
-    for craft in (LM50, SKEW, Spacecraft(torque_levels=(0.01, 0.4, 0.1, 0.02))):
+    few = [Spacecraft(torque_levels=x) for x in ((0.4,), (0.4, 0.01), (0.3, 0.3, 0.1))]
+    for craft in (LM50, SKEW, Spacecraft(torque_levels=(0.01, 0.4, 0.1, 0.02)), *few):
         context, same = context_of(craft), context_of(torque_order.in_order(craft))
         chosen = context.torque_table[torque_order.rows(context)]
         np.testing.assert_allclose(same.torque_table, chosen, atol=1e-15)

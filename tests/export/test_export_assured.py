@@ -3,6 +3,8 @@
 import ctypes
 import dataclasses
 import functools
+import json
+import shutil
 
 import exported
 import jax
@@ -179,3 +181,19 @@ def test_what_does_not_go_together(tmp_path, capsys, flags, said):
     common = ["--checkpoint", checkpoint, "--out", str(tmp_path / "flight")]
     assert said in one_line_error(export_script.main, common + flags, capsys)
     assert not (tmp_path / "flight").exists()
+
+
+@needs_compiler
+def test_the_world_must_fit_what_is_assured_only(tmp_path, capsys):
+    folder, short = tmp_path / "late", tmp_path / "short.toml"
+    shutil.copytree(ROOT / "pretrained" / "universal", folder)
+    config = json.loads((folder / "config.json").read_text())
+    config["world"] = {"name": "late", "actuators": {"delay": 200}}
+    (folder / "config.json").write_text(json.dumps(config))
+    short.write_text("inertia = [1, 1, 1]\ntorque_levels = [0.5]\nduration = 0.5\n")
+    flags = "--checkpoint", folder, "--out", tmp_path / "c", "--format", "c", "--spacecraft", short
+    flags = [str(x) for x in flags]
+    said = one_line_error(export_script.main, [*flags, "--assured"], capsys)
+    assert "actuators.delay and delay_jitter come to 200" in said
+    assert not (tmp_path / "c").exists()
+    assert export_script.main(flags) == 0
