@@ -130,14 +130,23 @@ On CPU it comes out as precise and settles 1 % later (docs/tuning.md); Table 2 i
 UNIVERSAL = PRECISE.replace(
     any_spacecraft=True,
     reward="way",
+    near_goal_steps=128,
     features="universal",
     hidden_sizes=(128, 128),
     max_episode_steps=800,
-    total_steps=60_000_000,
+    total_steps=200_000_000,
+    passes=2,
+    minibatch_size=2048,
 )
 """``precise`` for any spacecraft with three torque axes: one policy that sees what it flies."""
 
-TWO_TORQUES = UNIVERSAL.replace(crippled_share=1.0, total_steps=20_000_000)
+TWO_TORQUES = UNIVERSAL.replace(
+    crippled_share=1.0,
+    near_goal_steps=32,
+    total_steps=20_000_000,
+    passes=4,
+    minibatch_size=1024,
+)
 """``universal`` for what is left of such a spacecraft when the torques about one axis are dead."""
 
 CONTINUOUS = PRECISE.replace(
