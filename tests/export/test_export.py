@@ -59,6 +59,7 @@ OTHERS = [
     ("multiscale", (16,), 0.99, WHEELS),
     ("universal", (8, 8), 0.99),
     ("universal", (16,), 0.99, SKEW),
+    ("universal", (16,), 0.99, Spacecraft(torque_levels=(0.4,))),
 ]
 
 
