@@ -127,27 +127,22 @@ PRECISE_GPU = PRECISE.replace(num_envs=2048, minibatch_size=8192, learning_rate=
 On CPU it comes out as precise and settles 1 % later (docs/tuning.md); Table 2 is beaten later, too.
 """
 
-UNIVERSAL = PRECISE.replace(
+ANY_SPACECRAFT = PRECISE.replace(
     any_spacecraft=True,
     reward="way",
-    near_goal_steps=128,
     features="universal",
     hidden_sizes=(128, 128),
     max_episode_steps=800,
-    total_steps=200_000_000,
-    passes=2,
-    minibatch_size=2048,
+)
+"""What the two presets for any spacecraft have in common."""
+
+UNIVERSAL = ANY_SPACECRAFT.replace(
+    near_goal_steps=128, total_steps=200_000_000, passes=2, minibatch_size=2048
 )
 """``precise`` for any spacecraft with three torque axes: one policy that sees what it flies."""
 
-TWO_TORQUES = UNIVERSAL.replace(
-    crippled_share=1.0,
-    near_goal_steps=32,
-    total_steps=20_000_000,
-    passes=4,
-    minibatch_size=1024,
-)
-"""``universal`` for what is left of such a spacecraft when the torques about one axis are dead."""
+TWO_TORQUES = ANY_SPACECRAFT.replace(crippled_share=1.0, total_steps=20_000_000)
+"""The same for what is left of such a spacecraft when the torques about one axis are dead."""
 
 CONTINUOUS = PRECISE.replace(
     num_envs=2048, actions="continuous", rate_margin=0.96, greedy_share=0.0
