@@ -23,6 +23,9 @@ ACTIONS = 1 + 2 * LEVELS * AXES
 DEAD_LEVEL = 1e-4
 """Share of the largest torque below which a level has been identified to do nothing."""
 
+ABOUT = 1 - 1e-5
+"""Share of a moment below which another one is less, whatever the rounding of both."""
+
 FLATTEST = 1e-3
 """Volume that unit vectors along the axes must span, at least."""
 
@@ -147,12 +150,16 @@ def _three_of(levels):
 
 
 def _order(moments):
-    """(3,) numbers of the axes in their order."""
-    numbers = np.arange(AXES)
-    is_less = moments[None, :] < moments[:, None]
-    is_tied = (moments[None, :] == moments[:, None]) & (numbers[None, :] < numbers[:, None])
-    rank = jnp.sum(is_less | is_tied, axis=1)
-    return jnp.argmax(rank[None, :] == numbers[:, None], axis=1).astype(jnp.int32)
+    """(3,) numbers of the axes in their order, those of about equal moments as they stand."""
+    values, numbers = list(moments), [jnp.int32(axis) for axis in range(AXES)]
+    for n in (0, 1, 0):  # neighbours change places
+        is_less = values[n + 1] < ABOUT * values[n]
+        for row in (values, numbers):
+            first, second = row[n : n + 2]
+            row[n], row[n + 1] = jnp.where(
+                is_less, jnp.stack([second, first]), jnp.stack([first, second])
+            )
+    return jnp.stack(numbers)
 
 
 def axes_and_levels(torque_table: chex.Array) -> tuple[chex.Array, chex.Array, chex.Array]:
