@@ -10,9 +10,9 @@ from attjax.control import belief, covariance, identification, linearized, measu
 from attjax.control.covariance import product
 from attjax.control.linearized import AXES
 from attjax.control.response import Identity, Period
-from attjax.control.square_root import times
 from attjax.dynamics import vectors
 from attjax.dynamics.actuators import Queue
+from attjax.dynamics.numerics import matmul
 from attjax.envs.context import Context
 from attjax.envs.torques import applied_torque
 
@@ -86,15 +86,15 @@ def _shares(identity):
     root, inertia = identity.spread.response, jnp.stack([jnp.stack(x) for x in identity.inertia])
     along, across = [], []
     for a, column in enumerate(identity.columns):
-        momentum = times(inertia, root[6 + 3 * a : 9 + 3 * a])
-        size = times(inertia, jnp.stack(column)[:, None])
+        momentum = matmul(inertia, root[6 + 3 * a : 9 + 3 * a])
+        size = matmul(inertia, jnp.stack(column)[:, None])
         square = jnp.maximum(jnp.sum(size**2), identification.LEAST)
         along.append(jnp.sum(jnp.sum(momentum * size, axis=0) ** 2) / square)
         across.append(jnp.maximum(jnp.sum(momentum**2) - along[-1], 0) / 2)
     rows = response.gyroscopic(identity.mobility, identity.rate)
-    turning = times(inertia, jnp.stack([jnp.stack(row) for row in rows]))
-    swung = jnp.sum(times(turning, root[:6]) ** 2)
-    momentum = times(inertia, jnp.stack(identity.rate)[:, None])
+    turning = matmul(inertia, jnp.stack([jnp.stack(row) for row in rows]))
+    swung = jnp.sum(matmul(turning, root[:6]) ** 2)
+    momentum = matmul(inertia, jnp.stack(identity.rate)[:, None])
     most = jnp.sum(jnp.stack(identity.rate) ** 2) * jnp.sum(momentum**2)
     share = jnp.sqrt(swung / jnp.maximum(most, identification.LEAST))
     return jnp.max(jnp.stack(along)), jnp.sqrt(jnp.max(jnp.stack(across))), share

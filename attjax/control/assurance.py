@@ -6,7 +6,7 @@ from flax import struct
 
 from attjax import dynamics
 from attjax.dynamics import rigid_body
-from attjax.dynamics.numerics import square_root
+from attjax.dynamics.numerics import matmul, square_root
 from attjax.envs.context import Context
 
 
@@ -53,9 +53,9 @@ class RateMask:
         Returns:
             (actions,) bool.
         """
-        gradient = jnp.matmul(self.form, angular_velocity, precision="highest")
+        gradient = matmul(self.form, angular_velocity)
         # The peak's square after the action, less that before: a product for all actions at once.
-        gain = 2 * jnp.matmul(self.impulse, gradient, precision="highest") + self.own_gain
+        gain = 2 * matmul(self.impulse, gradient) + self.own_gain
         peak_squared = jnp.sum(gradient * angular_velocity) + gain
         return self.coasts | (peak_squared <= self.limit_squared) | (gain < 0)
 
@@ -92,7 +92,7 @@ def rate_mask(context: Context, margin: float) -> RateMask:
     at_rest = jnp.zeros(3, context.inertia.dtype)
     duration = context.torque_duration
     impulse = dynamics.rate_after_impulse(at_rest, context.torque_table, context.inertia, duration)
-    squared = jnp.sum(jnp.matmul(impulse, form, precision="highest") * impulse, axis=-1)
+    squared = jnp.sum(matmul(impulse, form) * impulse, axis=-1)
     growth = square_root(squared)
     kept, highest = margin * context.rate_limit, (1 + margin) / 2 * context.rate_limit
     turning = rigid_body.MOST_TURNING * duration * growth

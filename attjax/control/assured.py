@@ -18,7 +18,7 @@ from flax import struct
 from attjax.control.keep_out import Cones, cones_of
 from attjax.control.plants import Plants, plants
 from attjax.control.stopping import RATIO, Stopping, coasting, stopping
-from attjax.dynamics.numerics import square_root
+from attjax.dynamics.numerics import matmul, square_root
 from attjax.envs import observation as observations
 from attjax.envs.bounds import Bounds, bounds
 from attjax.envs.context import Context
@@ -73,7 +73,7 @@ class Assurance(struct.PyTreeNode):
 
     def changes(self, rate: chex.Array) -> tuple[chex.Array, chex.Array]:
         """The most that P², (rad/s)², is at a rate (3,), and (actions,) that it changes by."""
-        rate = jnp.matmul(rate, self.plants.axes, precision="highest")
+        rate = matmul(rate, self.plants.axes)
         peak = self.plants.peak(rate, self.error)
         beside = self.plants.beside(jnp.minimum(peak, self.limit), self.error)
         return peak**2, 2 * self.plants.work(rate) + beside

@@ -21,9 +21,10 @@ from attjax.control.response import (
     sensitivities,
     symmetric,
 )
-from attjax.control.square_root import PAIRS, Seen, Spread, times
+from attjax.control.square_root import PAIRS, Seen, Spread
 from attjax.dynamics import vectors
 from attjax.dynamics.fused_loop import together
+from attjax.dynamics.numerics import matmul
 
 SURPRISING = 35.4
 """χ² of three numbers that is passed by chance once in 1e7 decisions, three days at 40 Hz."""
@@ -109,8 +110,8 @@ def _ahead(identity, period, rows, kicks):
     offset = jnp.sum(own * (jnp.stack(identity.rate) - jnp.stack(period.before)), axis=1)
     given = jnp.stack(period.impulses).reshape(-1, len(kicks))
     spread = before._replace(
-        cross=times(own, before.cross) + times(by_response, before.response),
-        rate=times(times(own, before.rate), own.T) + jnp.diag(jnp.stack(period.unexplained)),
+        cross=matmul(own, before.cross) + matmul(by_response, before.response),
+        rate=matmul(matmul(own, before.rate), own.T) + jnp.diag(jnp.stack(period.unexplained)),
     )
     eye = jnp.eye(3, dtype=own.dtype)
     turned = jnp.sum((own - eye) ** 2) + float(jnp.finfo(own.dtype).eps) ** 0.5
@@ -134,8 +135,8 @@ def _own(ahead, identity):
     """
     spread = ahead.spread
     shares = jnp.sum(ahead.commands**2 * ahead.variances, axis=0)
-    rate = spread.rate + times(ahead.kicks.T * shares, ahead.kicks)
-    swung = times(ahead.by_response[:, :6], spread.response[:6])
+    rate = spread.rate + matmul(ahead.kicks.T * shares, ahead.kicks)
+    swung = matmul(ahead.by_response[:, :6], spread.response[:6])
     share = jnp.max(jnp.sum(spread.response[:6] ** 2, axis=1) / _sizes(identity) ** 2)
     most = jnp.sum(spread.cross**2) + jnp.trace(rate)
     more = ahead.turned * most + jnp.minimum(share, 1) * jnp.sum(swung**2)
@@ -170,8 +171,8 @@ def _opened(identity, ahead, seen, change):
     share = 1 / (1 + jnp.sqrt(1 + square))  # (√(1 + u²) − 1)/u², of the root of D² + w wᵀ
     root = jnp.diag(deviations) + share * whole[:, None] * shares
     opened = Spread(
-        rate=spread.rate + times(spread.cross, spread.cross.T),
-        cross=times(ahead.by_response, root),
+        rate=spread.rate + matmul(spread.cross, spread.cross.T),
+        cross=matmul(ahead.by_response, root),
         response=root,
     )
     return ahead._replace(
@@ -182,10 +183,10 @@ def _opened(identity, ahead, seen, change):
 
 def _strengths(ahead, white):
     """Errors of the strengths, each by itself, and their variances, after the rate was told."""
-    kicks = times(white.inverse, times(white.whitening, ahead.kicks.T))
+    kicks = matmul(white.inverse, matmul(white.whitening, ahead.kicks.T))
     weights = ahead.variances * ahead.commands
     certain = weights * ahead.commands * jnp.sum(kicks**2, axis=0)
-    error = weights * times(kicks.T, white.surprise)
+    error = weights * matmul(kicks.T, white.surprise)
     return error, ahead.variances * jnp.maximum(1 - certain, 0)
 
 

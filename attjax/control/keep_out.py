@@ -9,7 +9,7 @@ from flax import struct
 
 from attjax.dynamics import numerics
 from attjax.dynamics import quaternion as quaternions
-from attjax.dynamics.numerics import square_root
+from attjax.dynamics.numerics import matmul, square_root
 from attjax.envs.context import Context
 from attjax.world.keep_out import KeepOut
 
@@ -32,7 +32,7 @@ class Cones(struct.PyTreeNode):
     def seen(self, quaternion: chex.Array) -> chex.Array:
         """(cones, 3) unit vectors of the cones' middles, body frame, at an attitude (4,)."""
         turn = quaternions.rotation_matrix(quaternion)
-        return jnp.matmul(self.directions, turn, precision="highest")
+        return matmul(self.directions, turn)
 
     def clearance(self, quaternion: chex.Array) -> chex.Array:
         """(cones,) angles from the cones to their axes, rad; negative within.

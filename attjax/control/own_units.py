@@ -16,7 +16,8 @@ import chex
 import jax.numpy as jnp
 
 from attjax.control.torque_order import axes_and_levels
-from attjax.control.triad import across, dot, product, reciprocal, tensor, times
+from attjax.control.triad import dot, reciprocal, tensor, times
+from attjax.dynamics.numerics import across, matmul
 from attjax.envs.context import Context
 
 
@@ -64,13 +65,13 @@ class OwnUnits(NamedTuple):
         directions, levels, dead = axes_and_levels(context.torque_table)
         onto_axes = reciprocal(directions)
         impulse = levels[0] * context.torque_duration
-        momentum = product(onto_axes, tensor(context.inertia)) / impulse
+        momentum = matmul(onto_axes, tensor(context.inertia)) / impulse
         torque = context.disturbance
         torque = jnp.zeros_like(impulse, shape=3) if torque is None else torque
         return cls(
             momentum=momentum,
             directions=directions,
-            shape=product(momentum, onto_axes.T),
+            shape=matmul(momentum, onto_axes.T),
             levels=levels[1:] / levels[0],
             period=context.control_period,
             duration=context.torque_duration,

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from attjax.dynamics import rigid_body
-from attjax.dynamics.numerics import square_root
+from attjax.dynamics.numerics import matmul, square_root
 from attjax.envs.bounds import Bounds
 from attjax.envs.context import Context
 from attjax.spacecraft import INTEGRATION_STEP
@@ -159,7 +159,7 @@ def plants(context: Context, bounds: Bounds) -> Plants:
     turned, tilt = (
         2 * jnp.sin(jnp.asarray(x, low.dtype) / 2) for x in (bounds.turned, bounds.tilt)
     )
-    impulse = jnp.matmul(context.torque_table, axes, precision="highest") * context.torque_duration
+    impulse = matmul(context.torque_table, axes) * context.torque_duration
     share, offset = (jnp.asarray(x, low.dtype) for x in (bounds.share, bounds.offset))
     own = jnp.sqrt(jnp.sum(coefficients.growth * impulse**2, axis=-1))
     growth = share[1] * (own + inverse * (turned + tilt) * _length(impulse)) + inverse * offset

@@ -4,6 +4,8 @@ import chex
 import jax.numpy as jnp
 import numpy as np
 
+from attjax.dynamics.numerics import matmul
+
 
 def at_all_scales(scaled: chex.Array, factors: np.ndarray, plain: chex.Array) -> chex.Array:
     """(columns + plain,) tanh of ``scaled`` (n,) times ``factors`` (n, columns), then ``plain``.
@@ -13,5 +15,5 @@ def at_all_scales(scaled: chex.Array, factors: np.ndarray, plain: chex.Array) ->
     """
     factors = np.pad(factors, (0, plain.size)).astype(scaled.dtype)
     factors[scaled.size :, -plain.size :] = np.eye(plain.size)
-    features = jnp.matmul(jnp.concatenate([scaled, plain]), factors, precision="highest")
+    features = matmul(jnp.concatenate([scaled, plain]), factors)
     return jnp.where(np.any(factors[: scaled.size], axis=0), jnp.tanh(features), features)

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 
 from attjax.dynamics import vectors
 from attjax.dynamics.fused_loop import together
+from attjax.dynamics.numerics import matmul
 
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 """Elements of a symmetric matrix, row by row."""
@@ -74,9 +75,9 @@ def whitened(own: chex.Array, spread: Spread, seen: Seen) -> White:
     """
     whitening, _ = _roots(own + jnp.diag(seen.variances))
     whitening = seen.is_told * whitening
-    cross = times(whitening, spread.cross)
-    inverse, half = _roots(times(cross, cross.T) + jnp.eye(3, dtype=own.dtype))
-    residual = times(inverse, times(whitening, seen.residual))
+    cross = matmul(whitening, spread.cross)
+    inverse, half = _roots(matmul(cross, cross.T) + jnp.eye(3, dtype=own.dtype))
+    residual = matmul(inverse, matmul(whitening, seen.residual))
     return White(own, whitening, cross, inverse, half, residual)
 
 
@@ -113,28 +114,23 @@ def updated(spread: Spread, white: White, seen: Seen) -> tuple[Spread, chex.Arra
         white, seen: what is told.
     """
     root, cross = spread.response, white.cross
-    left = times(white.inverse.T, white.surprise)
-    seen_by = times(root, cross.T)
-    shrunk = times(white.inverse.T, white.half)
+    left = matmul(white.inverse.T, white.surprise)
+    seen_by = matmul(root, cross.T)
+    shrunk = matmul(white.inverse.T, white.half)
     back = seen.variances[:, None] * white.whitening.T
-    rate = times(back, times(white.whitening, white.own))
+    rate = matmul(back, matmul(white.whitening, white.own))
     kept = white.half + shrunk
     told = Spread(
         rate=(rate + rate.T) / 2,
-        cross=times(times(back, kept), cross),
-        response=root - times(times(seen_by, shrunk), cross),
+        cross=matmul(matmul(back, kept), cross),
+        response=root - matmul(matmul(seen_by, shrunk), cross),
     )
     after = vectors.chosen(seen.is_told > 0, told, spread._replace(rate=white.own))
-    error = seen.is_told * (seen.residual - times(back, left))
-    return after, error, times(seen_by, left)
-
-
-def times(a: chex.Array, b: chex.Array) -> chex.Array:
-    """The product of two small matrices."""
-    return jnp.matmul(a, b, precision="highest")
+    error = seen.is_told * (seen.residual - matmul(back, left))
+    return after, error, matmul(seen_by, left)
 
 
 def of_wide(matrix: chex.Array) -> chex.Array:
     """A square S with S Sᵀ = M Mᵀ, of a matrix M with more columns."""
-    values, axes = jnp.linalg.eigh(jnp.matmul(matrix, matrix.T, precision="highest"))
+    values, axes = jnp.linalg.eigh(matmul(matrix, matrix.T))
     return axes * jnp.sqrt(jnp.maximum(values, 0))

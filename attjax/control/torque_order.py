@@ -10,7 +10,8 @@ import chex
 import jax.numpy as jnp
 import numpy as np
 
-from attjax.control.triad import across, dot, shape
+from attjax.control.triad import dot, shape
+from attjax.dynamics.numerics import across
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
 from attjax.envs.way import DEAD

@@ -3,21 +3,18 @@
 import chex
 import jax.numpy as jnp
 
+from attjax.dynamics.numerics import across, matmul
+
 
 def shape(directions: chex.Array, inertia: chex.Array) -> chex.Array:
     """(3, 3) R I Rᵀ with the reciprocal basis R of the directions."""
     onto_axes = reciprocal(directions)
-    return product(product(onto_axes, tensor(inertia)), onto_axes.T)
+    return matmul(matmul(onto_axes, tensor(inertia)), onto_axes.T)
 
 
 def tensor(inertia: chex.Array) -> chex.Array:
     """(3, 3) of an inertia (3,) or (3, 3)."""
     return jnp.diag(inertia) if inertia.ndim == 1 else inertia
-
-
-def product(a: chex.Array, b: chex.Array) -> chex.Array:
-    """Of two matrices, in full precision on every device."""
-    return jnp.matmul(a, b, precision="highest")
 
 
 def times(matrix: chex.Array, vector: chex.Array) -> chex.Array:
@@ -31,12 +28,6 @@ def reciprocal(directions: chex.Array) -> chex.Array:
     """The matrix whose product with Σ pⱼ aⱼ is p."""
     rows = across(directions)
     return rows / dot(directions[0], rows[0])
-
-
-def across(directions: chex.Array) -> chex.Array:
-    """(3, 3) the cross product of the two other directions, in cyclic order, for each: rows."""
-    a, b, c = directions
-    return jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
 
 
 def dot(a: chex.Array, b: chex.Array) -> chex.Array:

@@ -17,6 +17,7 @@ import numpy as np
 
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
+from attjax.dynamics.numerics import matmul
 from attjax.dynamics.vectors import Vector, add
 
 Products = tuple[chex.Array, chex.Array, chex.Array, chex.Array, chex.Array, chex.Array]
@@ -146,7 +147,7 @@ class EquationsOfMotion(NamedTuple):
         else:
             inverse = rigid_body.inverse(inertia)
             gyroscopic = TensorTerms.of(inertia, inverse)
-            acceleration = jnp.matmul(inverse, torque, precision="highest")
+            acceleration = matmul(inverse, torque)
         return cls(torque=tuple(acceleration), gyroscopic=gyroscopic, kinematics=kinematics)
 
     def coasting(self) -> "EquationsOfMotion":

@@ -32,6 +32,27 @@ def unit(vector: Float[Array | np.ndarray, "n"]) -> Float[Array, "n"]:
     return jnp.divide(vector, jnp.sqrt(squared_norm(vector)))
 
 
+def matmul(a: Array | np.ndarray, b: Array | np.ndarray) -> Array:
+    """``jnp.matmul`` in full precision on every device: a GPU's own is of ten bits.
+
+    Example:
+        >>> matmul(jnp.eye(2), jnp.array([3.0, 4.0])).tolist()
+        [3.0, 4.0]
+    """
+    return jnp.matmul(a, b, precision="highest")
+
+
+def across(vectors: Float[Array | np.ndarray, "3 3"]) -> Float[Array, "3 3"]:
+    """Of each of three vectors, rows, the cross product of the two others, in cyclic order.
+
+    Example:
+        >>> across(jnp.eye(3)).tolist()
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    a, b, c = vectors
+    return jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
+
+
 def square_root(x: Float[Array | np.ndarray, "*shape"]) -> Float[Array, "*shape"]:
     """√x, element by element, with the gradient 0 where x is 0; that of the plain root is infinite.
 

@@ -11,6 +11,7 @@ from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics.equations import EquationsOfMotion, RigidState, add
 from attjax.dynamics.fused_loop import apart
 from attjax.dynamics.integration import AgentStep
+from attjax.dynamics.numerics import matmul
 from attjax.spacecraft import INTEGRATION_STEP
 
 
@@ -138,7 +139,7 @@ def rate_after_impulse(
     """
     if inertia.ndim == 1:
         return angular_velocity + torque / inertia * duration
-    acceleration = jnp.matmul(torque, rigid_body.inverse(inertia), precision="highest")
+    acceleration = matmul(torque, rigid_body.inverse(inertia))
     return angular_velocity + acceleration * duration
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from attjax import checks
-from attjax.dynamics.numerics import square_root
+from attjax.dynamics.numerics import across, matmul, square_root
 
 Inertia: TypeAlias = Float[Array | np.ndarray, "3"] | Float[Array | np.ndarray, "3 3"]
 """Principal moments, or a symmetric tensor in the body frame, kg m²."""
@@ -15,9 +15,8 @@ Inertia: TypeAlias = Float[Array | np.ndarray, "3"] | Float[Array | np.ndarray, 
 
 def inverse(inertia: Float[Array | np.ndarray, "3 3"]) -> Float[Array, "3 3"]:
     """Inverse of a symmetric 3x3 matrix, by the cross products of its rows."""
-    a, b, c = inertia
-    adjugate = jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
-    return adjugate / jnp.sum(a * adjugate[0])
+    adjugate = across(inertia)
+    return adjugate / jnp.sum(inertia[0] * adjugate[0])
 
 
 def angular_momentum(
@@ -26,7 +25,7 @@ def angular_momentum(
     """I ω, N m s, for an inertia (3,) or (3, 3) and (..., 3) angular velocities."""
     if inertia.ndim == 1:
         return inertia * angular_velocity
-    return jnp.matmul(angular_velocity, inertia, precision="highest")
+    return matmul(angular_velocity, inertia)
 
 
 def principal_moments(inertia: Inertia) -> Float[Array, "3"]:
@@ -56,9 +55,7 @@ def peak_rate(
         >>> round(peak_rate(jnp.array([0.0, 0.0, 0.4]), jnp.array([0.872, 0.115, 0.797])).item(), 4)
         0.4915
     """
-    squares = angular_velocity * jnp.matmul(
-        angular_velocity, peak_rate_form(inertia), precision="highest"
-    )
+    squares = angular_velocity * matmul(angular_velocity, peak_rate_form(inertia))
     return square_root(jnp.sum(squares, axis=-1))
 
 
@@ -78,5 +75,5 @@ def peak_rate_form(inertia: Inertia) -> Float[Array, "3 3"]:
     moments = principal_moments(inertia)
     low, high = jnp.min(moments), jnp.max(moments)
     tensor = jnp.diag(inertia) if inertia.ndim == 1 else inertia
-    squared = jnp.matmul(tensor, tensor, precision="highest")
+    squared = matmul(tensor, tensor)
     return ((low + high) * tensor - squared) / (low * high)

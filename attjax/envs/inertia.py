@@ -5,6 +5,7 @@ import jax.numpy as jnp
 
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics.draws import Draws
+from attjax.dynamics.numerics import matmul
 from attjax.world import Uncertainty
 
 
@@ -37,5 +38,5 @@ def drawn_inertia(
     if is_turned:
         angle = jnp.deg2rad(draws.number("axes_turned_deg", uncertainty.axes_turned_deg))
         turn = quaternions.from_axis_angle(draws.direction("axes_turned"), angle)
-        axes = jnp.matmul(quaternions.rotation_matrix(turn), axes, precision="highest")
+        axes = matmul(quaternions.rotation_matrix(turn), axes)
     return jnp.einsum("ik,k,jk->ij", axes, moments, axes, precision="highest")

@@ -11,6 +11,7 @@ import numpy as np
 from attjax.control.flight_loop import FlightLoop
 from attjax.control.time_optimal import rate_limited_reference
 from attjax.dynamics import rigid_body
+from attjax.dynamics.numerics import matmul
 from attjax.envs import fleet, parameters
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.context import Context
@@ -124,8 +125,8 @@ def quantisation(context: Context) -> chex.Array:
     smallest = context.torque_table[-6::2]
     inertia = context.inertia
     tensor = jnp.diag(inertia) if inertia.ndim == 1 else inertia
-    rate = jnp.matmul(smallest, rigid_body.inverse(tensor), precision="highest")
+    rate = matmul(smallest, rigid_body.inverse(tensor))
     edges = rate * context.torque_duration * context.control_period
     places = (np.arange(CELL) + 0.5) / CELL - 0.5
     points = np.array(list(itertools.product(places, repeat=3)), np.float32)
-    return jnp.mean(jnp.linalg.norm(jnp.matmul(points, edges, precision="highest"), axis=1))
+    return jnp.mean(jnp.linalg.norm(matmul(points, edges), axis=1))

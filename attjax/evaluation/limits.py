@@ -13,7 +13,7 @@ from flax import struct
 from attjax import sharding
 from attjax.control.keep_out import Cones, cones_of
 from attjax.dynamics import rigid_body
-from attjax.dynamics.numerics import squared_norm
+from attjax.dynamics.numerics import matmul, squared_norm
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.keys import steps_key
 from attjax.envs.torque_bounds import largest_speed
@@ -140,7 +140,7 @@ def _judge(env, within, start):
 
     def peak(state):
         rate = state.angular_velocity
-        product = jnp.matmul(forms, rate[..., None], precision="highest")[..., 0]
+        product = matmul(forms, rate[..., None])[..., 0]
         return jnp.sqrt(jnp.sum(product * rate, axis=-1))
 
     def judge(memory: Any, before: Any, after: Any) -> Nearness:

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
+from attjax.dynamics.numerics import matmul
 from attjax.ppo import losses
 
 LEAST_STD = 1e-4
@@ -49,7 +50,7 @@ class Categorical:
         """
         probabilities = jnp.exp(self.log_probabilities)
         up_to = np.tri(len(probabilities), dtype=probabilities.dtype)
-        cumulative = jnp.matmul(up_to, probabilities, precision="highest")
+        cumulative = matmul(up_to, probabilities)
         threshold = noise * (1 - 1e-6) * cumulative[-1]
         drawn = _first_row((cumulative > threshold) & (probabilities > 0))
         return jnp.where(greedy, self.mode(), drawn)

@@ -42,8 +42,8 @@ ASSURANCE_FAULTS = {
         "jnp.arange(len(change)) == jnp.argmax(change)", CLOSED,
     ),
     "a cone seen from the wrong frame": (
-        "attjax/control/keep_out.py", "jnp.matmul(self.directions, turn,",
-        "jnp.matmul(self.directions, turn.T,", CONES,
+        "attjax/control/keep_out.py", "matmul(self.directions, turn)",
+        "matmul(self.directions, turn.T)", CONES,
     ),
     "a gain's deviation for its bound": (
         "attjax/envs/torque_bounds.py", "return _end(number, largest(number), DEVIATIONS)",
