@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 
 from attjax import LM50, AttitudeEnv, errors, flight_loop
+from attjax.config.toml import read_spacecraft
 from attjax.control.assured import assurance
 from attjax.control.classical import CONTROLLERS
 from attjax.evaluation.episodes import fly_side_by_side
@@ -63,7 +64,8 @@ def parse_arguments(argv=None):
     parser.add_argument("--controller", default="phase-plane", help="a law's name, or a checkpoint")
     parser.add_argument("--frameskip", type=int, default=5)
     parser.add_argument("--episodes", type=int, default=1000)
-    parser.add_argument("--duration", type=float, default=43.75, help="of a slew of LM50, s")
+    parser.add_argument("--spacecraft", type=Path, help="TOML file (default: LM50)")
+    parser.add_argument("--duration", type=float, default=43.75, help="of a slew, s")
     parser.add_argument("--loops", default="plain,adaptive", help=f"of {', '.join(LOOPS)}")
     parser.add_argument("--assured", action="store_true", help="loops under run-time assurance")
     given = parser.parse_args(argv)
@@ -77,9 +79,10 @@ def parse_arguments(argv=None):
 def main(argv=None) -> int:
     """Fly and print."""
     given = parse_arguments(argv)
-    craft = dataclasses.replace(LM50, duration=given.duration)
-    ladder = conditions(craft, given.frameskip) | CHANGES
     with errors.one_line_errors():
+        craft = read_spacecraft(given.spacecraft) if given.spacecraft else LM50
+        craft = dataclasses.replace(craft, duration=given.duration)
+        ladder = conditions(craft, given.frameskip) | CHANGES
         unknown = [name for name in given.conditions if name not in ladder]
         if unknown:
             raise errors.UserError(f"no condition {unknown[0]!r}; there are {', '.join(ladder)}")
