@@ -8,7 +8,7 @@ import argparse
 import json
 from pathlib import Path
 
-from attjax.evaluation.robustness_table import angle, without_loop
+from attjax.evaluation.robustness_table import angle, way, without_loop
 
 HEAD = "| | success, overspeed | rms (°) | largest (°) | believed, rms (°) | settling (s) |"
 RULE = "|---|---|---|---|---|---|"
@@ -22,17 +22,25 @@ def main() -> None:
     for controller in dict.fromkeys(row["controller"] for row in rows):
         of_this = [row for row in rows if row["controller"] == controller]
         print(f"### {controller}\n\n{HEAD}\n{RULE}")
-        for looped, bare in paired(of_this):
-            print(line(looped["condition"], looped))
-            if without_loop(looped) != without_loop(bare):
-                print(line("— bare", bare))
+        for condition in dict.fromkeys(row["condition"] for row in of_this):
+            for name, row in named([x for x in of_this if x["condition"] == condition]):
+                print(line(name, row))
         print()
 
 
-def paired(rows: list[dict]) -> list[tuple[dict, dict]]:
-    """The row in a flight loop and the bare one of each condition."""
-    bare = {row["condition"]: row for row in rows if not row["flight_loop"]}
-    return [(row, bare[row["condition"]]) for row in rows if row["flight_loop"]]
+def named(rows: list[dict]) -> list[tuple[str, dict]]:
+    """A condition's rows of one controller: in a flight loop, and others that differ from it."""
+    looped = next(row for row in rows if way(row) == "loop")
+    found = [(looped["condition"], looped)]
+    for row in rows:
+        if row is not looped and figures(row) != figures(looped):
+            found.append((f"— {way(row)}", row))
+    return found
+
+
+def figures(row: dict) -> dict:
+    """What came of it, however it was flown."""
+    return {name: x for name, x in without_loop(row).items() if name != "adaptive"}
 
 
 def line(name: str, row: dict) -> str:
