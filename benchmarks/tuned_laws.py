@@ -28,7 +28,7 @@ SETS, SPREAD = 60, 1.8
 def main() -> None:
     """Tune, fly and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--agent-steps", type=int, default=60_000_000, help="for each law")
+    parser.add_argument("--agent-steps", type=int, default=200_000_000, help="for each law")
     parser.add_argument("--episodes", type=int, default=1000, help="of the last flights")
     given = parser.parse_args()
     env = AttitudeEnv(5)
