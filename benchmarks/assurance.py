@@ -8,6 +8,8 @@ Example:
     python benchmarks/assurance.py --flights 1000000 --part 1 --parts 2 --json one.json
     python benchmarks/assurance.py --flights 1000000 --part 2 --parts 2 --json two.json
     python benchmarks/assurance.py --rows one.json,two.json
+
+One that was stopped goes on: conditions that its file has are not flown again.
 """
 
 import dataclasses
@@ -180,15 +182,35 @@ def main(argv=None) -> int:
             print_rows([row for file in files for row in json.loads(file.read_text())])
             return 0
         every = conditions()
-        of_all = sum(2 + bool(x.keep_out) for x in every)
-        rows: list[dict] = []
+        flights = -(-arguments.flights // sum(2 + bool(x.keep_out) for x in every))
+        rows = flown_before(arguments.json, flights)
+        there = {row["condition"] for row in rows}
         for number, condition in enumerate(every):
-            if number % arguments.parts == arguments.part - 1:
-                rows += fly(condition, -(-arguments.flights // of_all), number)
+            is_ours = number % arguments.parts == arguments.part - 1
+            if is_ours and condition.name not in there:
+                rows += fly(condition, flights, number)
                 print(f"{rows[-1]['seconds']:6.1f} s  {condition.name}", file=sys.stderr)
                 common.write_json(arguments.json, rows)
     print_rows(rows)
     return 0
+
+
+def flown_before(file: Path | None, flights: int) -> list[dict]:
+    """The rows of a file that a run has written which was stopped; none if there is no such file.
+
+    Raises:
+        UserError: it holds something else, or another number of flights.
+    """
+    if file is None or not file.exists():
+        return []
+    try:
+        rows = json.loads(file.read_text())
+        counts = {row["flights"] for row in rows if row["condition"]}
+    except (ValueError, KeyError, TypeError):
+        raise errors.UserError(f"--json {file} is there, and holds no rows of flights") from None
+    if counts - {flights}:
+        raise errors.UserError(f"--json {file} has rows of other than {flights:,} flights each")
+    return rows
 
 
 def print_rows(rows: list[dict]) -> None:
