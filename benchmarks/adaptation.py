@@ -99,12 +99,8 @@ def flown(given, craft, world, loop):
     env = environment(kind(given.frameskip, spacecraft=craft), world)
     law, scores = controller_of(given.controller, adapts=loop == "adaptive")
     if loop == "told":
-        wrong = env.world.uncertainty is not None
-        if not wrong or (env.world.actuators, env.world.sensors, given.assured) != (
-            None,
-            None,
-            False,
-        ):
+        others = env.world.actuators, env.world.sensors
+        if env.world.uncertainty is None or others != (None, None) or given.assured:
             raise errors.UserError("told: of a wrong inertia alone, and not with --assured")
         pilot = jax.tree_util.Partial(informed, jax.tree_util.Partial(law))
     else:
