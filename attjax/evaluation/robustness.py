@@ -14,6 +14,7 @@ from attjax import evaluation
 from attjax.control.assured import assurance
 from attjax.control.flight_loop import flight_loop
 from attjax.envs.attitude import AttitudeEnv
+from attjax.evaluation.blocks import fly_blocks
 from attjax.evaluation.episodes import Episodes, fly_side_by_side
 from attjax.evaluation.flown import Controller
 from attjax.evaluation.ladder import conditions
@@ -87,7 +88,11 @@ def _rows(controllers, flights, name, world):
         for x, controller in controllers.items()
         if env.spacecraft == flights.env.spacecraft or _flies_any(controller)
     }
-    return list(_flown(able, env, flights, name))
+    rows = list(_flown(able, env, flights, name))
+    # No other condition flies these programs, and all of the ladder's would be more than the
+    # 65,530 memory maps that Linux gives a process.
+    fly_blocks.clear_cache()
+    return rows
 
 
 def environment(env: AttitudeEnv, world: World) -> AttitudeEnv:

@@ -13,6 +13,7 @@ from attjax.commands import eval as eval_command
 from attjax.config.run import check_world
 from attjax.control.classical import phase_plane, quaternion_feedback
 from attjax.evaluation import ladder, robustness, robustness_table
+from attjax.evaluation.blocks import fly_blocks
 from attjax.evaluation.episodes import fly_side_by_side
 from attjax.spacecraft import LM50
 from attjax.world import made_for, names
@@ -100,6 +101,13 @@ def test_rows_are_of_each_controller_in_both_ways(two_conditions):
     judged = evaluation.evaluate(phase_plane, SHORT, episodes=6, seed=1)
     assert ideal[0]["success_rate"] == judged["success_rate"]
     assert ideal[0]["settling_time_s"] == pytest.approx(judged["settling_time_s"]["mean"])
+
+
+def test_no_condition_leaves_its_programs_behind(two_conditions):
+    """Those of the whole ladder are more than a process can hold."""
+    fly_blocks.clear_cache()
+    robustness.robustness({"phase-plane": phase_plane}, robustness.Flights(SHORT, episodes=2))
+    assert fly_blocks._cache_size() == 0
 
 
 def test_rows_of_loops_that_adapt_and_of_assured_ones(two_conditions):
