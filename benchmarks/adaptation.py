@@ -34,6 +34,8 @@ CHANGES = {
     ),
     "delay of up to two periods": World(actuators=Actuators(delay=Uniform(0, 12))),
     "an axis dies": World(actuators=Actuators(faulty_axes=(1,), fault_time=MOMENT)),
+    "the middle torques die": World(actuators=Actuators(dead_levels=(2,), fault_time=MOMENT)),
+    "the largest torques die": World(actuators=Actuators(dead_levels=(1,), fault_time=MOMENT)),
 }
 
 

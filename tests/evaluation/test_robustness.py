@@ -1,5 +1,6 @@
 """The ladder of conditions: its worlds, its rows, what is printed and drawn of them."""
 
+import importlib
 import json
 
 import jax
@@ -170,3 +171,22 @@ def test_no_success_and_no_whole_flight_have_no_figures():
     none = dict.fromkeys(("rms_deg", "max_deg", "estimate_rms_deg", "settling_time_s"))
     row = dict.fromkeys(KEYS, 0.0) | {"episodes": 5} | none
     assert robustness_table.cells(row)[2:6] == ["–"] * 4
+
+
+def test_the_side_by_side_table_has_a_column_for_each_loop(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
+    table = importlib.import_module("robustness_table")
+    looped = {
+        "condition": "ideal", "controller": "policy", "flight_loop": True, "adaptive": False,
+        "success_rate": 0.985, "overspeed_rate": 0.015, "rms_deg": 8.8e-5, "settling_time_s": 7.98,
+    }  # fmt: skip
+    adaptive = looped | {"adaptive": True, "success_rate": 1.0, "overspeed_rate": 0.0}
+    none = {"rms_deg": None, "settling_time_s": None, "success_rate": 0.0}
+    elsewhere = looped | {"condition": "wheels"} | none
+    rows = [looped, looped | {"flight_loop": False}, adaptive, elsewhere]
+    assert table.side_by_side(rows) == [
+        "|  | policy, loop | policy, adaptive |",
+        "| --- | --- | --- |",
+        "| ideal | 98.5 % (1.5 % over), 0.000088°, 7.98 s | 100.0 %, 0.000088°, 7.98 s |",
+        "| wheels | 0.0 % (1.5 % over) |  |",
+    ]
