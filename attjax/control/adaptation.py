@@ -123,9 +123,24 @@ def begun(identity: Identity, estimate: Any) -> Identity:
         identity: before the first decision.
         estimate: of the first measurement.
     """
-    rows = [[covariance.at(estimate.covariance, 3 + i, 3 + j) for j in AXES] for i in AXES]
-    spread = identity.spread._replace(rate=jnp.stack([jnp.stack(row) for row in rows]))
-    return identity.replace(rate=estimate.angular_velocity, spread=spread)
+    spread = identity.spread._replace(rate=_of_what_gyros_tell(estimate))
+    rate = vectors.add(estimate.angular_velocity, _bias(estimate))
+    return identity.replace(rate=rate, spread=spread)
+
+
+def _bias(estimate):
+    """Of the gyro, rad/s."""
+    return (0.0,) * 3 if estimate.bias is None else estimate.bias
+
+
+def _of_what_gyros_tell(estimate):
+    """(3, 3) covariance of the sum of rate and bias: of a sample, however unknown the bias is."""
+    parts = [3] if estimate.bias is None else [3, 6]
+
+    def element(i, j):
+        return sum(covariance.at(estimate.covariance, m + i, n + j) for m in parts for n in parts)
+
+    return jnp.stack([jnp.stack([element(i, j) for j in AXES]) for i in AXES])
 
 
 def identified(
@@ -149,7 +164,8 @@ def identified(
     floor = least_change(model, context) ** 2
     numbers = [x._replace(variance=x.variance + floor) for x in numbers]
     before, after = estimate.angular_velocity, predicted.angular_velocity
-    period = Period(before, after, impulses, _unexplained(estimate, model, steps))
+    unexplained = _unexplained(estimate, after, model, steps)
+    period = Period(before, after, impulses, unexplained, _bias(estimate))
     identity, change = identification.corrected(identity, period, numbers, model)
     added = [change * x.innovation * x.innovation for x in numbers]
     size = len(predicted.covariance)
@@ -168,11 +184,14 @@ def least_change(model: linearized.Model, context: Context) -> chex.Array:
     return identification.RESOLVED * weakest * context.torque_duration * least
 
 
-def _unexplained(estimate, model, steps):
-    """Variances that rounding and a torque that is not known well add to the rate's."""
-    size = len(estimate.covariance)
+def _unexplained(estimate, after, model, steps):
+    """Variances that rounding, a gyro's bias and a torque not known well add to what it tells."""
+    size, gyro = len(estimate.covariance), model.knowledge.rate
     rate = estimate.angular_velocity
     found = [steps * model.rounding * (x * x + measured.LEAST) for x in rate]
+    if estimate.bias is not None:
+        turning = gyro.share_of(tuple(y - x for x, y in zip(rate, after)), rate)
+        found = [x + gyro.walk**2 * model.period + y for x, y in zip(found, turning)]
     if estimate.torque is None:
         return tuple(found)
     spread = [covariance.at(estimate.covariance, size - 3 + i, size - 3 + i) for i in AXES]

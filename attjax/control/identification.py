@@ -92,7 +92,7 @@ def corrected(
     white = square_root.whitened(_own(ahead, identity), ahead.spread, seen)
     strengths, doubts = _strengths(ahead, white)
     spread, error, response = square_root.updated(ahead.spread, white, seen)
-    rate = jnp.stack(period.after) + offset + error
+    rate = jnp.stack(period.after) + jnp.stack(period.bias) + offset + error
     added = vectors.components(response[6:].reshape(len(kicks), 3))
     return identity.replace(
         rate=tuple(rate),
@@ -107,7 +107,8 @@ def corrected(
 def _ahead(identity, period, rows, kicks):
     """What is known at the end of a period, and the rate there, less the estimator's."""
     before, own, by_response = identity.spread, rows[:, :3], rows[:, 3:]
-    offset = jnp.sum(own * (jnp.stack(identity.rate) - jnp.stack(period.before)), axis=1)
+    before_it = jnp.stack(period.before) + jnp.stack(period.bias)
+    offset = jnp.sum(own * (jnp.stack(identity.rate) - before_it), axis=1)
     given = jnp.stack(period.impulses).reshape(-1, len(kicks))
     spread = before._replace(
         cross=matmul(own, before.cross) + matmul(by_response, before.response),
@@ -161,7 +162,8 @@ def _opened(identity, ahead, seen, change):
     alone = jnp.append((change - most) * sizes, jnp.zeros(3 * axes, sizes.dtype))
     each = SHARE_OF_EACH * jnp.append(sizes, lengths)
     deviations = jnp.sum(spread.response**2, axis=1)
-    deviations = jnp.sqrt(deviations + (SHARE_OF_CHANGE * alone) ** 2 + each**2)
+    deviations = jnp.maximum(deviations, each**2)  # not more by each of many changes
+    deviations = jnp.sqrt(deviations + (SHARE_OF_CHANGE * alone) ** 2)
     strengths = jnp.stack(identity.strengths).reshape(is_on.shape)
     kick = jnp.sum(jnp.sum(ahead.commands * strengths, axis=0)[:, None] * ahead.kicks, axis=0)
     left = 1 + jnp.sum(kick * seen.residual) / jnp.maximum(jnp.sum(kick**2), LEAST)

@@ -30,7 +30,7 @@ class Identity(struct.PyTreeNode):
     """What is known of a spacecraft's response, by components.
 
     Attributes:
-        rate: ω, rad/s, by this filter.
+        rate: as the gyro tells it, by this filter: ω and the gyro's bias, rad/s.
         mobility: N, elements as of PAIRS, 1/(kg m²).
         columns: B_a, (axes,) of vectors, 1/(kg m²).
         strengths: (valves,) share that each level about each axis gives of what it is asked.
@@ -58,12 +58,14 @@ class Period(NamedTuple):
         before, after: the estimator's rate at its beginning, and predicted at its end, rad/s.
         impulses: (valves,) that were commanded in it, N m s, signed.
         unexplained: (3,) variances of the rate by what else is unknown of it, rad²/s².
+        bias: of the gyro, by the estimator, rad/s.
     """
 
     before: Vector
     after: Vector
     impulses: tuple[Any, ...]
     unexplained: tuple[Any, ...]
+    bias: Vector = (0.0, 0.0, 0.0)
 
 
 def inverted(elements: tuple[Any, ...]) -> vectors.Matrix:

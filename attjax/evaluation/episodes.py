@@ -7,7 +7,7 @@ import chex
 import jax
 import numpy as np
 
-from attjax import sharding
+from attjax import errors, sharding
 from attjax.envs import parameters
 from attjax.envs.attitude import AttitudeEnv
 from attjax.envs.parameters import EnvParams, EnvState
@@ -55,7 +55,7 @@ def fly(
         progress: called now and then with how many have flown.
 
     Raises:
-        ValueError: there are none.
+        ValueError: there are none, or something that came of them is not finite.
     """
     return _fly((controller,), env, params, key, (episodes, False, progress))
 
@@ -72,7 +72,7 @@ def fly_side_by_side(
         env, params, key, episodes: as of :func:`fly`.
 
     Raises:
-        ValueError: there are no episodes.
+        ValueError: there are no episodes, or something that came of them is not finite.
     """
     flown = _fly(controllers, env, params, key, (episodes, True, None))
     return [
@@ -100,7 +100,18 @@ def _fly(controllers, env, params, key, how):
         if progress is not None:
             progress(min(start + a_call, episodes))
     slews = episodes * len(controllers)
-    return jax.tree.map(lambda *x: np.concatenate(x).reshape(-1)[:slews], *flown)
+    whole = jax.tree.map(lambda *x: np.concatenate(x).reshape(-1)[:slews], *flown)
+    _check_finite(whole)
+    return whole
+
+
+def _check_finite(flown):
+    """Raise an error that says in how many slews the first number is that is not finite."""
+    for path, x in jax.tree_util.tree_leaves_with_path(flown):
+        wrong = np.count_nonzero(~np.isfinite(x))
+        if wrong:
+            name = jax.tree_util.keystr(path, simple=True, separator=" ")
+            raise errors.UserValueError(f"{name} is not finite in {wrong:,} of {len(x):,} slews")
 
 
 def _in_blocks(shape, axes, params):

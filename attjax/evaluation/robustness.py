@@ -5,7 +5,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from concurrent import futures
-from typing import Any
+from typing import Any, cast
 
 import jax
 import numpy as np
@@ -91,7 +91,7 @@ def _rows(controllers, flights, name, world):
     rows = list(_flown(able, env, flights, name))
     # No other condition flies these programs, and all of the ladder's would be more than the
     # 65,530 memory maps that Linux gives a process.
-    fly_blocks.clear_cache()
+    cast(Any, fly_blocks).clear_cache()
     return rows
 
 
@@ -118,9 +118,9 @@ def _policy_of(controller):
 def _flown(controllers, env, flights, name):
     plain: Any = tuple(jax.tree_util.Partial(x) for x in controllers.values())
     guard = assurance(env) if flights.assured else None
-    crews = {False: (*_loops(plain, guard, adapts=False), *plain)}
+    crews = {False: (*_loops(controllers, guard, adapts=False), *plain)}
     if flights.adaptive and env.world.wheels is None:
-        crews[True] = _loops(plain, guard, adapts=True)
+        crews[True] = _loops(controllers, guard, adapts=True)
     params, key = env.default_params, jax.random.key(flights.seed)
     for adapts, crew in crews.items():
         flown = fly_side_by_side(crew, env, params, key, flights.episodes)
@@ -131,8 +131,8 @@ def _flown(controllers, env, flights, name):
             yield row | outcome(of_this, env)
 
 
-def _loops(plain, guard, adapts):
-    return tuple(_loop(x, guard, adapts) for x in plain)
+def _loops(controllers, guard, adapts):
+    return tuple(_loop(x, guard, adapts) for x in controllers.values())
 
 
 def _loop(controller, guard, adapts):

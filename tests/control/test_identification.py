@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from worlds import world
 
-from attjax import AttitudeEnv, Spacecraft, flight_loop
+from attjax import LM50, AttitudeEnv, Spacecraft, flight_loop
 from attjax.control import adaptation, belief, linearized, response
 from attjax.control.response import PAIRS, Period
 from attjax.envs.parameters import measured
@@ -187,3 +187,32 @@ def test_wheels_are_refused():
 def test_pairs_are_the_elements_of_a_symmetric_matrix():
     rows = response.symmetric(tuple(range(6)))
     assert [rows[i][j] for i, j in PAIRS] == [rows[j][i] for i, j in PAIRS] == list(range(6))
+
+
+def test_a_bias_of_the_gyro_is_no_change_of_the_spacecraft():
+    """All that tells of it is the star tracker: what a pulse changes the rate by stays as it is."""
+    env = AttitudeEnv(5, world=world(sensors={"gyro": {"bias_deg_per_h": 200}}))
+    memory, _, path = flown(env, 200)
+    assert np.abs(np.array(memory.estimate.bias)).max() > 1e-4
+    np.testing.assert_allclose(path, path[:1].repeat(len(path), axis=0), rtol=1e-3)
+
+
+def test_levels_that_are_dead_take_no_axis_with_them():
+    """After four that are about x and z, one about y, which was not moved meanwhile."""
+    env = AttitudeEnv(5, world=world(actuators={"dead_levels": [2, 3]}))
+    loop, context = flight_loop(wandering, adapts=True), env.context(env.default_params)
+    state = env.reset(jax.random.key(0), env.default_params)[1]
+
+    def step(carry, action):
+        memory, state = carry
+        _, memory = loop.observed(memory, measured(state), context)
+        memory = loop.after(memory, action, context)
+        return (memory, env.step_env(jax.random.key(0), state, action, env.default_params)[1]), None
+
+    actions = jnp.array([3, 1, 5, 3, 1, 5, 7, 11, 13, 17, 9, 0])  # the middle one about y at last
+    (memory, _), _ = jax.lax.scan(step, (loop.init(context), state), actions)
+    columns = np.array(memory.identity.columns)
+    np.testing.assert_allclose(columns * np.array(LM50.inertia), np.eye(3), rtol=0, atol=0.02)
+    strengths = np.array(memory.identity.strengths).reshape(3, 3)
+    np.testing.assert_allclose(strengths[0], 1, atol=0.02)
+    assert np.all(strengths[1] < 0.1) and np.all(strengths[2, [0, 2]] < 0.1)

@@ -16,6 +16,7 @@ from attjax.control.classical import phase_plane, quaternion_feedback
 from attjax.evaluation import ladder, robustness, robustness_table
 from attjax.evaluation.blocks import fly_blocks
 from attjax.evaluation.episodes import fly_side_by_side
+from attjax.runs.flight import network
 from attjax.spacecraft import LM50
 from attjax.world import made_for, names
 
@@ -122,6 +123,22 @@ def test_rows_of_loops_that_adapt_and_of_assured_ones(two_conditions):
     laws = list(LAWS)
     expected = [f"{law}, {way}" for way in ("loop", "bare", "adaptive") for law in laws]
     assert names == expected
+
+
+def test_a_policy_is_flown_under_assurance_by_its_own_scores(two_conditions, monkeypatch):
+    """And not by which impulse is the nearest to that of its best action, as a law is."""
+    crews = []
+    monkeypatch.setattr(robustness, "fly_side_by_side", lambda crew, *_: crews.append(crew) or ())
+    policy, params = network(ROOT / "pretrained" / "precise")
+    act = jax.tree_util.Partial(policy.act, params)
+    flights = robustness.Flights(SHORT, episodes=1, adaptive=True, assured=True)
+    robustness.robustness({"policy": act, "phase-plane": phase_plane}, flights)
+    context = SHORT.context(SHORT.default_params)
+    observation = jax.numpy.zeros(11).at[3].set(1.0)
+    wanted = policy.scores(params, observation, context)
+    assert len(crews) == 4
+    for loop, *_ in crews:
+        np.testing.assert_array_equal(loop.scores(observation, context), wanted)
 
 
 def test_the_small_spacecrafts_worlds_are_flown_with_their_own():
