@@ -12,6 +12,7 @@ import chex
 import jax.numpy as jnp
 
 from attjax import checks
+from attjax.control import torque_order, triad
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
 from attjax.dynamics.numerics import squared_norm
@@ -46,7 +47,8 @@ def phase_plane(observation: chex.Array, context: Context, gains: Gains = GAINS)
     With the impulses shared among the axes so that all arrive together, the angle |θ| that
     remains can be braked from the rate ω = −θ √(2 η U / Σ|I θ|), where U is the largest
     torque averaged over a control period and η the braking margin. Continuous torques brake all
-    axes at once, and the one that takes longest rules: max|I θ| in place of the sum. Close to
+    axes at once, and the one that takes longest rules: max|I θ| in place of the sum. Where torques
+    are along other axes, or not all as large, it is what :func:`momentum_to_give` says. Close to
     the goal the rate is limited to a share of θ in each period. (θ is what ω must integrate to;
     by other kinematics than Eq. 9's that is not the angle.)
 
@@ -97,13 +99,18 @@ def average_torque(context: Context) -> chex.Array:
 def momentum_to_give(angle: chex.Array, context: Context) -> chex.Array:
     """What :func:`average_torque` must give for a turn by a (3,) angle in a second, N m s.
 
-    Of torques about one axis at a time, Σ|I θ|. Of continuous ones, which act about all at once,
-    the largest |I θ|, each in proportion to the largest torque about its axis.
+    Of torques about one axis at a time, Σ|pⱼ| with I θ = Σ pⱼ aⱼ, where aⱼ is the largest about
+    each of three axes over the largest of all; of more or fewer axes, of the body's. Of continuous
+    ones, which act about all at once, the largest |I θ|, each in proportion to the largest torque
+    about its axis.
     """
-    momentum = jnp.abs(rigid_body.angular_momentum(context.inertia, angle))
-    if not context.continuous:
-        return jnp.sum(momentum)
-    return jnp.max(context.largest_torque * _over(momentum, context))
+    momentum = rigid_body.angular_momentum(context.inertia, angle)
+    if context.continuous:
+        return jnp.max(context.largest_torque * _over(jnp.abs(momentum), context))
+    if context.torque_axes == torque_order.AXES:
+        directions, _, _ = torque_order.axes_and_levels(context.torque_table)
+        momentum = triad.times(triad.reciprocal(directions), momentum)
+    return jnp.sum(jnp.abs(momentum))
 
 
 def nearest_action(

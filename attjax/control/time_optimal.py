@@ -12,7 +12,8 @@ from attjax.envs.context import Context
 def time_optimal_reference(quaternion: chex.Array, context: Context) -> chex.Array:
     """Rest-to-rest time of a (4,) slew with decoupled axes, T = 2 √(Σ|θᵢ|Iᵢ/U), s.
 
-    U is the largest torque averaged over a control period. An estimate and no bound: turning
+    U is the largest torque averaged over a control period; where torques are along other axes, or
+    not all as large, the sum is :func:`momentum_to_give`. An estimate and no bound: turning
     about other axes than the eigenaxis can be about a tenth quicker. Continuous torques act about
     all axes at once: the largest |θᵢ|Iᵢ in place of the sum.
     """

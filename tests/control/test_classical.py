@@ -1,10 +1,12 @@
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from attjax import AttitudeEnv, evaluation
+from attjax import AttitudeEnv, Spacecraft, evaluation
 from attjax.control import classical
 from attjax.dynamics import quaternion as quaternions
 from attjax.envs import observation
@@ -123,3 +125,22 @@ def test_controllers_fly_every_slew(name, error_deg, settling_s):
     assert result["success_rate"] == 1 and result["overspeed_rate"] == 0
     assert result["terminal"]["error_deg"]["mean"] < error_deg
     assert result["settling_time_s"]["mean"] < settling_s
+
+
+def test_the_momentum_of_a_turn_is_shared_among_the_torques_that_there_are():
+    """Of axes that are askew, and where one of them gives half of the others."""
+    angle = jnp.array([0.3, -0.9, 0.2])
+    plain = classical.momentum_to_give(angle, CONTEXT)
+    assert plain == jnp.sum(jnp.abs(CONTEXT.inertia * angle))  # to the bit
+    axes = np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, -0.6, 0.8]])
+    env = AttitudeEnv(5, spacecraft=Spacecraft(torque_axes=tuple(map(tuple, axes.tolist()))))
+    context = env.context(env.default_params)
+    turn = np.linalg.solve(np.diag(context.inertia), axes.T @ [2.0, -3.0, 0.5])
+    ours = classical.momentum_to_give(jnp.array(turn), context)
+    assert float(ours) == pytest.approx(2 + 3 + 0.5, rel=1e-5)
+    is_of_first = np.arange(-1, 18) // 2 % 3 == 0
+    weak = context.torque_table * np.where(is_of_first, 0.5, 1)[:, None]
+    ours = classical.momentum_to_give(
+        jnp.array(turn), dataclasses.replace(context, torque_table=weak)
+    )
+    assert float(ours) == pytest.approx(2 / 0.5 + 3 + 0.5, rel=1e-5)
