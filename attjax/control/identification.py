@@ -35,6 +35,9 @@ SHARE_OF_CHANGE = 1.0
 SHARE_OF_EACH = 0.1
 """The same of each number by itself: ±10 % is what projects assume of an inertia."""
 
+GONE = 0.05
+"""Share of an effect below which nothing is left of it."""
+
 MOST_STEP = 0.5
 """A correction of N leaves at least this share of it along every axis, so it stays positive."""
 
@@ -149,8 +152,9 @@ def _opened(identity, ahead, seen, change):
 
     If something was commanded in the period, all may have changed in proportion, as by a mass that
     came or went, or the strength of what was commanded. No mass takes all of an effect away, so the
-    first is the likelier the more is left of it. If nothing was commanded, the moments may have
-    changed. Each number may be somewhat off besides, and how errors went together is lost.
+    first is the likelier the more is left of it; where nothing is, it is the strength alone. If
+    nothing was commanded, the moments may have changed. Each number may be somewhat off besides,
+    and how errors went together is lost.
     """
     spread, axes = ahead.spread, len(ahead.kicks)
     is_on = jnp.where(ahead.commands != 0, change, 0)
@@ -167,6 +171,7 @@ def _opened(identity, ahead, seen, change):
     strengths = jnp.stack(identity.strengths).reshape(is_on.shape)
     kick = jnp.sum(jnp.sum(ahead.commands * strengths, axis=0)[:, None] * ahead.kicks, axis=0)
     left = 1 + jnp.sum(kick * seen.residual) / jnp.maximum(jnp.sum(kick**2), LEAST)
+    is_of_all = (change > 0) & (left > GONE)
     whole = SHARE_OF_CHANGE * most * jnp.clip(left, 0, 1) * response
     shares = whole / jnp.maximum(deviations, LEAST)
     square = jnp.sum(shares**2)
@@ -178,7 +183,7 @@ def _opened(identity, ahead, seen, change):
         response=root,
     )
     return ahead._replace(
-        spread=vectors.chosen(change > 0, opened, spread),
+        spread=vectors.chosen(is_of_all, opened, spread),
         variances=ahead.variances + SHARE_OF_CHANGE**2 * is_on,
     )
 
