@@ -3,6 +3,7 @@
 import chex
 import jax
 import jax.numpy as jnp
+import pytest
 
 from attjax import AttitudeEnv, evaluation
 from attjax.control.classical import phase_plane
@@ -22,3 +23,13 @@ def test_slews_are_the_same_in_whatever_blocks_they_fly(monkeypatch):
     assert so_many == [12, 23]
     assert all(x.shape == (23,) for x in jax.tree.leaves(in_blocks))
     chex.assert_trees_all_close(in_blocks, at_once, rtol=1e-5, atol=1e-6)
+
+
+def test_what_is_not_finite_is_no_result():
+    def broken(observation, context):
+        return jnp.where(observation[:3] > 2, 0.0, jnp.nan)
+
+    env = AttitudeEnv(frameskip=20, actions="continuous")
+    params = env.default_params.replace(max_steps_in_episode=jnp.array(5, jnp.int32))
+    with pytest.raises(ValueError, match="is not finite in 3 of 3 slews"):
+        evaluation.fly(jax.tree_util.Partial(broken), env, params, jax.random.key(0), 3)
