@@ -15,7 +15,7 @@ from attjax import checks
 from attjax.control import torque_order, triad
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
-from attjax.dynamics.numerics import squared_norm
+from attjax.dynamics.numerics import across, squared_norm
 from attjax.envs import observation as observations
 from attjax.envs import torques
 from attjax.envs.context import Context
@@ -100,17 +100,26 @@ def momentum_to_give(angle: chex.Array, context: Context) -> chex.Array:
     """What :func:`average_torque` must give for a turn by a (3,) angle in a second, N m s.
 
     Of torques about one axis at a time, Σ|pⱼ| with I θ = Σ pⱼ aⱼ, where aⱼ is the largest about
-    each of three axes over the largest of all; of more or fewer axes, of the body's. Of continuous
-    ones, which act about all at once, the largest |I θ|, each in proportion to the largest torque
-    about its axis.
+    each of three axes over the largest of all; where there are not three, up and down, that span a
+    space, of the body's. Of continuous ones, which act about all at once, the largest |I θ|, each
+    in proportion to the largest torque about its axis.
     """
     momentum = rigid_body.angular_momentum(context.inertia, angle)
     if context.continuous:
         return jnp.max(context.largest_torque * _over(jnp.abs(momentum), context))
-    if context.torque_axes == torque_order.AXES:
-        directions, _, _ = torque_order.axes_and_levels(context.torque_table)
-        momentum = triad.times(triad.reciprocal(directions), momentum)
-    return jnp.sum(jnp.abs(momentum))
+    return jnp.sum(jnp.abs(triad.times(triad.reciprocal(_axes(context)), momentum)))
+
+
+def _axes(context):
+    """(3, 3) the a of :func:`momentum_to_give`, a row each."""
+    table, count = context.torque_table, torque_order.AXES
+    body = jnp.eye(3, dtype=table.dtype)
+    if context.torque_axes != count or (len(table) - 1) % (2 * count):
+        return body
+    axes, _, _ = torque_order.axes_and_levels(table)
+    is_of_pairs = jnp.all(table[1::2] == -table[2::2])
+    volume = jnp.abs(triad.dot(axes[0], across(axes)[0]))
+    return jnp.where(is_of_pairs & (volume > torque_order.FLATTEST), axes, body)
 
 
 def nearest_action(

@@ -144,3 +144,18 @@ def test_the_momentum_of_a_turn_is_shared_among_the_torques_that_there_are():
         jnp.array(turn), dataclasses.replace(context, torque_table=weak)
     )
     assert float(ours) == pytest.approx(2 / 0.5 + 3 + 0.5, rel=1e-5)
+
+
+@pytest.mark.parametrize("change", ["in a plane", "of no pairs", "of another number"])
+def test_of_torques_that_are_not_three_axes_in_space_the_bodys_axes_count(change):
+    angle, table = jnp.array([0.3, -0.9, 0.2]), np.array(CONTEXT.torque_table)
+    if change == "in a plane":
+        table[:, 2] = 0.5 * table[:, 0]
+        table[5:7] = table[1:3] + table[3:5]
+    elif change == "of no pairs":
+        table = table[:, [1, 2, 0]] * np.array([1, 0.5, 0.2]) + 0.01
+    else:
+        table = table[:5]
+    context = dataclasses.replace(CONTEXT, torque_table=jnp.asarray(table))
+    ours = classical.momentum_to_give(angle, context)
+    assert ours == jnp.sum(jnp.abs(CONTEXT.inertia * angle))
