@@ -5,6 +5,7 @@ import json
 
 import jax
 import numpy as np
+import programs
 import pytest
 from commands import ROOT
 from scipy import stats
@@ -107,9 +108,8 @@ def test_rows_are_of_each_controller_in_both_ways(two_conditions):
 
 def test_no_condition_leaves_its_programs_behind(two_conditions):
     """Those of the whole ladder are more than a process can hold."""
-    fly_blocks.clear_cache()
     robustness.robustness({"phase-plane": phase_plane}, robustness.Flights(SHORT, episodes=2))
-    assert fly_blocks._cache_size() == 0
+    assert programs.held(fly_blocks) == 0
 
 
 def test_rows_of_loops_that_adapt_and_of_assured_ones(two_conditions):

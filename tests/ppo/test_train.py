@@ -4,6 +4,7 @@ import functools
 import jax
 import jax.numpy as jnp
 import numpy as np
+import programs
 import pytest
 from jax.sharding import PartitionSpec
 from probes import Probe
@@ -118,10 +119,10 @@ def test_one_compilation_serves_blocks_of_any_length():
     setup = small_attitude_setup(10)
     env_params = build.env_params(setup)
     state = train_state.init(setup, env_params, jax.random.key(0))
-    before = ppo.train_block._cache_size()
+    before = programs.held(ppo.train_block)
     for length in (1, 2, 3):
         state, _ = ppo.train_block(setup, env_params, state, length)
-    assert ppo.train_block._cache_size() == before + 1
+    assert programs.held(ppo.train_block) == before + 1
     assert state.update == 6
 
 
