@@ -15,7 +15,7 @@ from attjax import checks
 from attjax.control import torque_order, triad
 from attjax.dynamics import quaternion as quaternions
 from attjax.dynamics import rigid_body
-from attjax.dynamics.numerics import across, squared_norm
+from attjax.dynamics.numerics import squared_norm
 from attjax.envs import observation as observations
 from attjax.envs import torques
 from attjax.envs.context import Context
@@ -118,8 +118,8 @@ def _axes(context):
         return body
     axes, _, _ = torque_order.axes_and_levels(table)
     is_of_pairs = jnp.all(table[1::2] == -table[2::2])
-    volume = jnp.abs(triad.dot(axes[0], across(axes)[0]))
-    return jnp.where(is_of_pairs & (volume > torque_order.FLATTEST), axes, body)
+    spans_space = jnp.abs(triad.volume(axes)) > torque_order.FLATTEST
+    return jnp.where(is_of_pairs & spans_space, axes, body)
 
 
 def nearest_action(

@@ -16,8 +16,8 @@ import chex
 import jax.numpy as jnp
 
 from attjax.control.torque_order import axes_and_levels
-from attjax.control.triad import dot, reciprocal, tensor, times
-from attjax.dynamics.numerics import across, matmul
+from attjax.control.triad import reciprocal, tensor, times, volume
+from attjax.dynamics.numerics import matmul
 from attjax.envs.context import Context
 
 
@@ -49,7 +49,7 @@ class OwnUnits(NamedTuple):
     @property
     def hand(self) -> chex.Array:
         """1 where the axes are right-handed, else -1."""
-        return jnp.where(dot(self.directions[0], across(self.directions)[0]) < 0, -1, 1)
+        return jnp.where(volume(self.directions) < 0, -1, 1)
 
     @classmethod
     def of(cls, context: Context) -> "OwnUnits":

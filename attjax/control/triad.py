@@ -30,6 +30,11 @@ def reciprocal(directions: chex.Array) -> chex.Array:
     return rows / dot(directions[0], rows[0])
 
 
+def volume(directions: chex.Array) -> chex.Array:
+    """What they span, negative where they are left-handed."""
+    return dot(directions[0], across(directions)[0])
+
+
 def dot(a: chex.Array, b: chex.Array) -> chex.Array:
     """a·b of vectors (3,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
